@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// \file
+/// The marginal prior: what the window remembers of everything that has left it.
+///
+/// A quadratic on the tangent space of the remaining variables at a fixed point x0 (VariableRecord::prior_theta):
+///
+///     cost(x) = c + g' d + 1/2 d' H d,        d = x (-) x0
+///     gradient at theta:  g + H (theta (-) x0)
+///
+/// It is the update matrix that the front of the leaving state left behind: the Schur complement of all factors that touched the state, plus the
+/// prior that was absorbed in it. H is positive semidefinite; only its lower triangle is stored.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include <searvins/core/static_vector.hpp>
+#include <searvins/smoother/variable.hpp>
+#include <searvins/smoother/window.hpp>
+
+namespace searvins::smoother {
+
+template <class Scalar, int MaxDimension, int MaxVariables>
+struct MarginalPrior {
+  int dimension{0};
+  StaticVector<int, static_cast<std::size_t>(MaxVariables)> variables{};  ///< global indices, in the order of their rows
+  std::array<Scalar, static_cast<std::size_t>(MaxDimension) * MaxDimension> H{};  ///< lower triangle, column-major, leading dimension `dimension`
+  std::array<Scalar, static_cast<std::size_t>(MaxDimension)> g{};
+  std::array<Scalar, static_cast<std::size_t>(MaxDimension)> reference{};  ///< information before any elimination, per row: the scale of a zero pivot
+  std::array<Scalar, static_cast<std::size_t>(MaxDimension)> d{}, Hd{};    ///< x (-) x0 and H d of the last evaluation
+  Scalar c{0};
+
+  [[nodiscard]] bool empty() const { return dimension == 0; }
+  [[nodiscard]] Scalar& h(int row, int column) { return H[static_cast<std::size_t>(column) * static_cast<std::size_t>(dimension) + static_cast<std::size_t>(row)]; }
+  [[nodiscard]] Scalar h(int row, int column) const {
+    return H[static_cast<std::size_t>(column) * static_cast<std::size_t>(dimension) + static_cast<std::size_t>(row)];
+  }
+
+  /// Fills d and Hd for the variables' values `W` and returns the cost there.
+  template <Which W, class WindowType>
+  Scalar evaluate(WindowType& window) {
+    if (empty()) return 0;
+    for (int id : variables) {
+      const int row = window.info(id).prior;
+      window.visit_variable(id, [&]<class V>(VariableRecord<V>& r) {
+        const V& at = W == Which::theta ? r.theta : W == Which::candidate ? r.candidate : r.x;
+        const Tangent<V> step = r.prior_theta.local(at);
+        for (int i = 0; i < V::dof; ++i) d[static_cast<std::size_t>(row + i)] = step[i];
+      });
+    }
+    const auto at = [](int i) { return static_cast<std::size_t>(i); };
+    for (int i = 0; i < dimension; ++i) Hd[at(i)] = 0;
+    for (int j = 0; j < dimension; ++j) {
+      const Scalar dj = d[at(j)];
+      Scalar sum = h(j, j) * dj;
+      for (int i = j + 1; i < dimension; ++i) {
+        Hd[at(i)] += h(i, j) * dj;
+        sum += h(i, j) * d[at(i)];
+      }
+      Hd[at(j)] += sum;
+    }
+    Scalar cost = c;
+    for (int i = 0; i < dimension; ++i) cost += d[at(i)] * (g[at(i)] + Hd[at(i)] / 2);
+    return cost;
+  }
+
+  /// Moves the expansion point to theta: g and c there, x0 = theta. Exact on vector spaces, first order on curved ones.
+  template <class WindowType>
+  void move_to_theta(WindowType& window) {
+    if (empty()) return;
+    c = evaluate<Which::theta>(window);
+    for (int i = 0; i < dimension; ++i) g[static_cast<std::size_t>(i)] += Hd[static_cast<std::size_t>(i)];
+    for (int id : variables) window.visit_variable(id, [](auto& r) { r.prior_theta = r.theta; });
+  }
+
+  template <class WindowType>
+  void clear(WindowType& window) {
+    for (int id : variables) window.info(id).prior = -1;
+    variables.clear();
+    dimension = 0;
+    c = 0;
+  }
+};
+
+}  // namespace searvins::smoother
