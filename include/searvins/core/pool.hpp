@@ -57,12 +57,10 @@ class Pool {
     if (full()) return failure(StatusCode::capacity_exceeded, "the Pool is full: erase or raise N", -1, static_cast<std::int32_t>(N));
     const std::uint32_t slot = free_head_ != kNone ? free_head_ : used_;
     values_[slot] = value;  // before any bookkeeping: `value` may be an element of this pool
-    if (slot == free_head_) {
+    if (slot == free_head_)
       free_head_ = next_free_[slot];
-      next_free_[slot] = 0;
-    } else {
+    else
       ++used_;
-    }
     ++generation_[slot];
     ++size_;
     return Key{slot, generation_[slot]};
@@ -80,10 +78,8 @@ class Pool {
 
   /// Removes every element and forgets the order of free slots, as in a new pool; keys given out so far stay invalid for good.
   constexpr void clear() {
-    for (std::uint32_t slot = 0; slot < used_; ++slot) {
+    for (std::uint32_t slot = 0; slot < used_; ++slot)
       if (alive(slot)) release(slot);
-      next_free_[slot] = 0;
-    }
     free_head_ = kNone;
     used_ = 0;
   }
@@ -132,7 +128,7 @@ class Pool {
 
   std::array<T, N> values_{};
   std::array<std::uint32_t, N> generation_{};
-  std::array<std::uint32_t, N> next_free_{};  ///< meaningful for free slots below used_; 0 elsewhere
+  std::array<std::uint32_t, N> next_free_{};  ///< meaningful for free slots below used_
   std::uint32_t free_head_{kNone};            ///< the slot emptied last, kNone when every slot below used_ is alive
   std::uint32_t used_{0};                     ///< slots [used_, N) have not been filled since clear()
   std::uint32_t size_{0};

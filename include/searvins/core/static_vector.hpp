@@ -73,8 +73,9 @@ class StaticVector {
   /// Inserts before position i (i <= size()); false when full.
   constexpr bool insert(std::size_t i, const T& value) {
     if (size_ == N || i > size_) return false;
+    T copy = value;  // `value` may be an element of this vector that is about to move
     for (std::size_t k = size_; k > i; --k) data_[k] = std::move(data_[k - 1]);
-    data_[i] = value;
+    data_[i] = std::move(copy);
     ++size_;
     return true;
   }

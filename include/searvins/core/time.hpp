@@ -21,8 +21,12 @@ inline constexpr std::int64_t kSecondsPerDay = 86'400;
 inline constexpr std::int64_t kSecondsPerWeek = 604'800;
 inline constexpr std::int64_t kNanosecondsPerWeek = kSecondsPerWeek * kNanosecondsPerSecond;
 
-/// Nearest integer number of nanoseconds. The argument is in seconds, |seconds| < 9.2e9.
+/// Nearest integer number of nanoseconds (halves up). Seconds beyond +-4.6e9 (145 years) saturate and NaN gives 0, so that garbage is no
+/// undefined behaviour, not even when added to an instant; a reader refuses non-finite numbers before they become a time.
 [[nodiscard]] inline std::int64_t nanoseconds_from_seconds(double seconds) {
+  constexpr double kLimit = 4.6e9;
+  if (!(seconds >= -kLimit)) return seconds < 0 ? -static_cast<std::int64_t>(kLimit) * kNanosecondsPerSecond : 0;
+  if (seconds > kLimit) return static_cast<std::int64_t>(kLimit) * kNanosecondsPerSecond;
   const double whole = std::floor(seconds);
   return static_cast<std::int64_t>(whole) * kNanosecondsPerSecond + static_cast<std::int64_t>(std::llround((seconds - whole) * 1e9));
 }
@@ -32,14 +36,21 @@ struct GpsTime {
   std::int64_t ns{0};
 
   /// From GPS week (not modulo 1024) and seconds of week, which may lie outside [0, 604800).
-  [[nodiscard]] static GpsTime from_week_sow(std::int64_t week, double sow) { return {week * kNanosecondsPerWeek + nanoseconds_from_seconds(sow)}; }
+  [[nodiscard]] static GpsTime from_week_sow(std::int64_t week, double sow) {
+    return {week * kNanosecondsPerWeek + nanoseconds_from_seconds(sow)};
+  }
 
   /// GPS week, counted without rollover.
-  [[nodiscard]] constexpr std::int64_t week() const { return ns >= 0 ? ns / kNanosecondsPerWeek : -((-ns + kNanosecondsPerWeek - 1) / kNanosecondsPerWeek); }
+  [[nodiscard]] constexpr std::int64_t week() const { return ns / kNanosecondsPerWeek - (ns % kNanosecondsPerWeek < 0 ? 1 : 0); }
   /// Nanoseconds of week, [0, 604800e9).
-  [[nodiscard]] constexpr std::int64_t ns_of_week() const { return ns - week() * kNanosecondsPerWeek; }
+  [[nodiscard]] constexpr std::int64_t ns_of_week() const {
+    const std::int64_t rest = ns % kNanosecondsPerWeek;
+    return rest < 0 ? rest + kNanosecondsPerWeek : rest;
+  }
   /// Seconds of week, [0, 604800).
-  [[nodiscard]] constexpr double sow() const { return static_cast<double>(ns_of_week() / kNanosecondsPerSecond) + static_cast<double>(ns_of_week() % kNanosecondsPerSecond) * 1e-9; }
+  [[nodiscard]] constexpr double sow() const {
+    return static_cast<double>(ns_of_week() / kNanosecondsPerSecond) + static_cast<double>(ns_of_week() % kNanosecondsPerSecond) * 1e-9;
+  }
 
   [[nodiscard]] GpsTime plus_seconds(double seconds) const { return {ns + nanoseconds_from_seconds(seconds)}; }
 
@@ -53,13 +64,17 @@ struct GpsTime {
 /// Galileo System Time: nanoseconds since GST week 0 (1999-08-22 00:00:00 GPST, 13 s before midnight UTC).
 struct GalileoTime {
   std::int64_t ns{0};
-  [[nodiscard]] static GalileoTime from_week_sow(std::int64_t week, double sow) { return {week * kNanosecondsPerWeek + nanoseconds_from_seconds(sow)}; }
+  [[nodiscard]] static GalileoTime from_week_sow(std::int64_t week, double sow) {
+    return {week * kNanosecondsPerWeek + nanoseconds_from_seconds(sow)};
+  }
 };
 
 /// BeiDou Time: nanoseconds since 2006-01-01 00:00:00 UTC.
 struct BeidouTime {
   std::int64_t ns{0};
-  [[nodiscard]] static BeidouTime from_week_sow(std::int64_t week, double sow) { return {week * kNanosecondsPerWeek + nanoseconds_from_seconds(sow)}; }
+  [[nodiscard]] static BeidouTime from_week_sow(std::int64_t week, double sow) {
+    return {week * kNanosecondsPerWeek + nanoseconds_from_seconds(sow)};
+  }
 };
 
 inline constexpr std::int64_t kGalileoWeekOffset = 1024;  ///< GPS week of GST week 0
@@ -67,9 +82,13 @@ inline constexpr std::int64_t kBeidouWeekOffset = 1356;   ///< GPS week of BDT w
 inline constexpr std::int64_t kBeidouLagSeconds = 14;     ///< GPST - BDT
 
 [[nodiscard]] constexpr GpsTime to_gps(GalileoTime t) { return {t.ns + kGalileoWeekOffset * kNanosecondsPerWeek}; }
-[[nodiscard]] constexpr GpsTime to_gps(BeidouTime t) { return {t.ns + kBeidouWeekOffset * kNanosecondsPerWeek + kBeidouLagSeconds * kNanosecondsPerSecond}; }
+[[nodiscard]] constexpr GpsTime to_gps(BeidouTime t) {
+  return {t.ns + kBeidouWeekOffset * kNanosecondsPerWeek + kBeidouLagSeconds * kNanosecondsPerSecond};
+}
 [[nodiscard]] constexpr GalileoTime to_galileo(GpsTime t) { return {t.ns - kGalileoWeekOffset * kNanosecondsPerWeek}; }
-[[nodiscard]] constexpr BeidouTime to_beidou(GpsTime t) { return {t.ns - kBeidouWeekOffset * kNanosecondsPerWeek - kBeidouLagSeconds * kNanosecondsPerSecond}; }
+[[nodiscard]] constexpr BeidouTime to_beidou(GpsTime t) {
+  return {t.ns - kBeidouWeekOffset * kNanosecondsPerWeek - kBeidouLagSeconds * kNanosecondsPerSecond};
+}
 
 /// A civil date and time of day without a scale; the function that takes or returns it names the scale.
 struct CivilTime {
@@ -92,7 +111,8 @@ inline constexpr std::int64_t kGpsEpochUnixDays = days_from_civil(1980, 1, 6);
 
 /// A civil reading of a clock that shows GPS time (RINEX observation tags).
 [[nodiscard]] inline GpsTime gps_from_civil(const CivilTime& c) {
-  const std::int64_t whole = (days_from_civil(c.year, c.month, c.day) - kGpsEpochUnixDays) * kSecondsPerDay + c.hour * 3600LL + c.minute * 60LL;
+  const std::int64_t whole =
+      (days_from_civil(c.year, c.month, c.day) - kGpsEpochUnixDays) * kSecondsPerDay + c.hour * 3600LL + c.minute * 60LL;
   return {whole * kNanosecondsPerSecond + nanoseconds_from_seconds(c.second)};
 }
 
@@ -118,22 +138,33 @@ inline constexpr std::int64_t kGpsEpochUnixDays = days_from_civil(1980, 1, 6);
   return c;
 }
 
-/// GPST - UTC at an instant of GPS time, seconds. Table of IERS Bulletin C up to 2017-01-01; none has been announced since (2026).
+namespace detail {
+
+/// Months that began with one more leap second: IERS Bulletin C up to 2017-01-01; none has been announced since (2026).
+struct LeapStep {
+  int year, month;
+};
+inline constexpr LeapStep kLeapSteps[] = {{1981, 7}, {1982, 7}, {1983, 7}, {1985, 7}, {1988, 1}, {1990, 1},
+                                          {1991, 1}, {1992, 7}, {1993, 7}, {1994, 7}, {1996, 1}, {1997, 7},
+                                          {1999, 1}, {2006, 1}, {2009, 1}, {2012, 7}, {2015, 7}, {2017, 1}};
+
+/// Nanoseconds of UTC, leap seconds not counted, from the GPS epoch to the month of a step.
+[[nodiscard]] constexpr std::int64_t utc_ns_of(LeapStep step) {
+  return (days_from_civil(step.year, step.month, 1) - kGpsEpochUnixDays) * kSecondsPerDay * kNanosecondsPerSecond;
+}
+
+}  // namespace detail
+
+/// GPST - UTC at an instant of GPS time, seconds: the new value holds from 00:00:00 UTC, so the leap second 23:59:60 has the old one.
 [[nodiscard]] constexpr int leap_seconds(GpsTime t) {
-  struct Step {
-    int year, month;
-  };
-  constexpr Step steps[] = {{1981, 7}, {1982, 7}, {1983, 7}, {1985, 7}, {1988, 1}, {1990, 1}, {1991, 1}, {1992, 7}, {1993, 7},
-                            {1994, 7}, {1996, 1}, {1997, 7}, {1999, 1}, {2006, 1}, {2009, 1}, {2012, 7}, {2015, 7}, {2017, 1}};
   int leap = 0;
-  for (const Step& s : steps) {
-    const std::int64_t utc_midnight = (days_from_civil(s.year, s.month, 1) - kGpsEpochUnixDays) * kSecondsPerDay;
-    if (t.ns >= (utc_midnight + leap + 1) * kNanosecondsPerSecond) ++leap;
-  }
+  for (const detail::LeapStep& step : detail::kLeapSteps)
+    if (t.ns >= detail::utc_ns_of(step) + (leap + 1) * kNanosecondsPerSecond) ++leap;
   return leap;
 }
 
-/// An instant of UTC: nanoseconds since 1970-01-01 00:00:00 UTC, leap seconds not counted (Unix time).
+/// An instant of UTC: nanoseconds since 1970-01-01 00:00:00 UTC, leap seconds not counted (Unix time). A leap second 23:59:60 has the
+/// same number as the second after it.
 struct UtcTime {
   std::int64_t unix_ns{0};
 };
@@ -142,14 +173,19 @@ struct UtcTime {
   return {t.ns - leap_seconds(t) * kNanosecondsPerSecond + kGpsEpochUnixDays * kSecondsPerDay * kNanosecondsPerSecond};
 }
 
+/// Of the two instants that share a number at a leap second this is the later, 00:00:00 and what follows; so to_utc(to_gps(u)) is u
+/// always, and to_gps(to_utc(t)) is t outside leap seconds.
 [[nodiscard]] constexpr GpsTime to_gps(UtcTime t) {
-  const std::int64_t shifted = t.unix_ns - kGpsEpochUnixDays * kSecondsPerDay * kNanosecondsPerSecond;
-  const GpsTime guess{shifted + leap_seconds(GpsTime{shifted}) * kNanosecondsPerSecond};
-  return {shifted + leap_seconds(guess) * kNanosecondsPerSecond};  // one refinement settles the second next to a step
+  const std::int64_t since_epoch_ns = t.unix_ns - kGpsEpochUnixDays * kSecondsPerDay * kNanosecondsPerSecond;
+  int leap = 0;
+  for (const detail::LeapStep& step : detail::kLeapSteps)
+    if (since_epoch_ns >= detail::utc_ns_of(step)) ++leap;
+  return {since_epoch_ns + leap * kNanosecondsPerSecond};
 }
 
 /// Resolves a week number known modulo `modulus` (1024 for legacy GPS) to the week nearest a reference week.
-[[nodiscard]] constexpr std::int64_t resolve_week_rollover(std::int64_t truncated_week, std::int64_t reference_week, std::int64_t modulus = 1024) {
+[[nodiscard]] constexpr std::int64_t resolve_week_rollover(std::int64_t truncated_week, std::int64_t reference_week,
+                                                           std::int64_t modulus = 1024) {
   const std::int64_t base = truncated_week % modulus;
   std::int64_t week = reference_week - (reference_week % modulus) + base;
   if (week - reference_week > modulus / 2) week -= modulus;

@@ -191,6 +191,12 @@ class Elimination {
     }
   }
 
+  /// Forgets every front.
+  void clear() {
+    fronts_.fill(Front{});
+    count_ = tangent_size_ = 0;
+  }
+
   /// First front that must be factored again.
   [[nodiscard]] int first_dirty() const {
     for (int f = 0; f < count_; ++f)

@@ -31,60 +31,10 @@
 #include <searvins/smoother/covariance.hpp>
 #include <searvins/smoother/elimination.hpp>
 #include <searvins/smoother/marginal_prior.hpp>
+#include <searvins/smoother/optimise.hpp>
 #include <searvins/smoother/window.hpp>
 
 namespace searvins::smoother {
-
-/// What happens to the linearisation point of variables that the prior touches.
-enum class PriorLinearisation : std::uint8_t {
-  relinearise,    ///< follows the estimate; the prior's gradient is moved along
-  first_estimate  ///< stays where the prior was made; new factors are linearised there too, so no direction gains spurious information
-};
-
-/// Settings of optimise().
-template <class Scalar>
-struct OptimiseOptions {
-  int max_iterations{10};
-  Scalar step_tolerance{Scalar(1e-4)};  ///< converged when every axis moves less than this times its linearisation_scale()
-  Scalar relinearise_threshold{0};      ///< in units of linearisation_scale(); 0: relinearise whatever moved
-  Scalar weight_threshold{0};           ///< a factor is reweighted when a row's weight changed by more than this
-  Scalar initial_damping{Scalar(1e-4)};  ///< first Levenberg-Marquardt damping after a step that did not decrease the cost
-  int max_damping_steps{8};             ///< damping grows tenfold each
-  PriorLinearisation prior{PriorLinearisation::relinearise};
-};
-
-/// Names an axis about which the window knows nothing.
-struct UnderDetermined {
-  AnyKey variable{};
-  const char* variable_name{""};
-  const char* axis_name{""};
-  int axis{-1};
-  GpsTime stamp{};
-  double pivot{0};
-  int factor_count{0};                           ///< factors that touch the variable
-  StaticVector<const char*, 8> factor_names{};   ///< their types, each once
-};
-
-/// Outcome of optimise(). `status`: ok (converged); not_converged (iteration limit: the improved values are kept; or no step decreased the cost:
-/// values as before); under_determined (`where` names the axis; values as before); non_finite; capacity_exceeded; no_data.
-template <class Scalar>
-struct OptimiseReport {
-  Status status{};
-  int iterations{0};
-  Scalar initial_cost{0}, final_cost{0};
-  Scalar last_step{0};  ///< largest axis movement of the last step, in units of linearisation_scale()
-  int damped_steps{0};
-  int fronts_factored{0};  ///< over all iterations
-  UnderDetermined where{};
-};
-
-/// Outcome of marginalise_oldest().
-struct MarginaliseReport {
-  Status status{};
-  int variables{0}, factors{0};  ///< that left
-  int unconnected{0};            ///< of them, variables that nothing touched: a no-op, counted
-  int skipped_axes{0};           ///< axes without information
-};
 
 template <class Problem>
 class FixedLagSmoother {
@@ -157,8 +107,7 @@ class FixedLagSmoother {
   void set_enabled(bool on) {
     if (window_.template enabled<F>() == on) return;
     window_.template set_enabled<F>(on);
-    if (window_.template factor_count<F>() > 0) {
-      ensure_analysis();
+    if (window_.template factor_count<F>() > 0 && ensure_analysis()) {
       window_.for_each_factor([&]<class G>(FactorRecord<G>& r, int) {
         if constexpr (std::is_same_v<G, F>) elimination_.mark_dirty_from(r.front);
       });
@@ -249,6 +198,19 @@ class FixedLagSmoother {
     if (report.status = form_prior(); !report.status.ok()) return report;
     remove_first_front(report);
     return report;
+  }
+
+  /// Forgets everything: no variables, factors or prior; every key is stale afterwards.
+  void clear() {
+    prior_.clear(window_);
+    int n = 0;
+    window_.for_each_factor([&](auto&, int id) { doomed_[static_cast<std::size_t>(n++)] = id; });
+    for (int i = 0; i < n; ++i) window_.erase_factor(doomed_[static_cast<std::size_t>(i)]);
+    n = 0;
+    window_.for_each_variable([&](auto&, int id) { row_[static_cast<std::size_t>(n++)] = id; });
+    for (int i = 0; i < n; ++i) window_.erase_variable(row_[static_cast<std::size_t>(i)]);
+    elimination_.clear();
+    changed_ = true, damped_ = false;
   }
 
   /// Joint covariance (column-major, leading dimension ld) of any living variables, in the order of the keys, from the undamped factor at the present

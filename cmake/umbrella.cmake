@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# include/searvins/searvins.hpp is the list of every header but those of io/.
+#   cmake -P cmake/umbrella.cmake               fails when the list is not the tree's
+#   cmake -DWRITE=ON -P cmake/umbrella.cmake    writes it
+cmake_minimum_required(VERSION 3.23)
+get_filename_component(root "${CMAKE_CURRENT_LIST_DIR}/.." ABSOLUTE)
+set(umbrella "${root}/include/searvins/searvins.hpp")
+
+file(GLOB_RECURSE headers RELATIVE "${root}/include" "${root}/include/searvins/*.hpp")
+list(FILTER headers EXCLUDE REGEX "^searvins/(io/.*|searvins\\.hpp)$")
+list(SORT headers)
+set(text "// SPDX-License-Identifier: BSD-3-Clause\n/// \\file\n/// Everything but io/. For programs on a desktop; firmware and tests include the narrow headers.\n")
+string(APPEND text "/// The list is written by `cmake -DWRITE=ON -P cmake/umbrella.cmake`; a test compares it with the tree.\n#pragma once\n")
+set(folder "")
+foreach(header IN LISTS headers)
+  get_filename_component(this_folder "${header}" DIRECTORY)
+  if(NOT this_folder STREQUAL folder)
+    string(APPEND text "\n")
+    set(folder "${this_folder}")
+  endif()
+  string(APPEND text "#include <${header}>\n")
+endforeach()
+
+set(current "")
+if(EXISTS "${umbrella}")
+  file(READ "${umbrella}" current)
+endif()
+if(current STREQUAL text)
+  return()
+endif()
+if(WRITE)
+  file(WRITE "${umbrella}" "${text}")
+else()
+  message(FATAL_ERROR "include/searvins/searvins.hpp is not the list of the headers in the tree. Run: cmake -DWRITE=ON -P cmake/umbrella.cmake")
+endif()

@@ -1,0 +1,60 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Shows what searvins does: installs what is missing (apt), builds the command, solves the bundled synthetic recording and, where
+# ../shared/data lies beside the project, the real ones. Everything it writes is under build/.
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+searvins=$root/build/release/searvins
+out=$root/build/demo
+real=${SEARVINS_SHARED_DIR:-$root/../shared}/data/real
+# shellcheck source=cmake/install_packages.sh
+source "$root/cmake/install_packages.sh"
+
+build() {
+  need_tools build eigen
+  (cd "$root" && cmake --preset release -Wno-dev >/dev/null && cmake --build --preset release -j "$(build_jobs)")
+}
+
+solve_synthetic() {
+  echo
+  echo "== The bundled synthetic recording"
+  "$searvins" demo --out "$out"
+}
+
+# solve_real FOLDER TRUTH_OPTIONS... : the recording FOLDER with its rover.obs and base.obs; the rest goes to the command.
+solve_real() {
+  local folder=$1
+  shift
+  echo
+  echo "== $folder"
+  "$searvins" solve --out "$out/$folder" "$@"
+}
+
+solve_recordings() {
+  local kamakura=$real/kamakura_drive_2021 nagoya=$real/nagoya_static_2024
+  solve_real kamakura_drive_2021 --rover "$kamakura/rover.obs" --base "$kamakura/base.obs" --nav "$kamakura/nav.rnx" \
+    --base-ecef -3959400.631,3385704.533,3667523.111 --truth "$kamakura/reference.csv"
+  solve_real nagoya_static_2024 --rover "$nagoya/rover.obs" --base "$nagoya/base.obs" --nav "$nagoya/base.nav" \
+    --base-ecef -3817681.1213,3562839.4311,3650159.1593
+}
+
+say_where_the_reports_are() {
+  echo
+  echo "Open in a browser:"
+  find "$out" -name report.html | sort | sed 's/^/  /'
+}
+
+main() {
+  build
+  solve_synthetic
+  if [ -d "$real" ]; then
+    solve_recordings
+  else
+    echo
+    echo "No recordings at $real: only the synthetic one was solved."
+  fi
+  say_where_the_reports_are
+}
+
+main "$@"

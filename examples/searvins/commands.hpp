@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// \file
+/// The subcommands of `searvins`. Each takes its own arguments (argv[0] is the subcommand's name) and returns the exit code:
+/// 0 done, 2 usage, 3 unusable input, 4 the run ended degraded.
+#pragma once
+
+namespace searvins::examples {
+
+int run_solve(int argc, const char* const* argv);     ///< recordings -> trajectory, report
+int run_info(int argc, const char* const* argv);      ///< what is in an input file
+int run_evaluate(int argc, const char* const* argv);  ///< scores trajectories against a truth
+int run_demo(int argc, const char* const* argv);      ///< solves the bundled recording
+
+}  // namespace searvins::examples

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// \file
+/// What report.html shows about a run, as plain data: a command fills a RunReport and hands it to write_report() (report.hpp).
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <searvins/io/trajectory.hpp>
+
+#include "examples/support/evaluation.hpp"
+#include "examples/support/truth.hpp"
+
+namespace searvins::examples {
+
+/// Diagnostics of one row. Unknown: NaN, or -1 for counts.
+struct ReportEpoch {
+  int satellites_seen{-1}, satellites_used{-1};
+  double mean_cn0_dbhz{io::kUnknown};                            ///< of the signals in use
+  std::vector<int> rejected{};                                   ///< signals rejected, by RunReport::rejection_reasons; may be shorter
+  double weight_code{io::kUnknown}, weight_phase{io::kUnknown};  ///< mean robust weight, 0..1
+  int fix_outcome{-1};                                           ///< index into RunReport::fix_outcomes
+  double ratio{io::kUnknown};                                    ///< second best over best integer vector
+  double base_age_s{io::kUnknown};
+};
+
+/// One satellite on the sky at one time.
+struct ReportSkyPoint {
+  double azimuth_deg{0}, elevation_deg{0};
+  double cn0_dbhz{io::kUnknown};
+  double rejected_share{0};  ///< of its signals, 0..1
+};
+
+/// The path of one satellite.
+struct ReportSatellite {
+  std::string name;  ///< as in RINEX: G05
+  std::vector<ReportSkyPoint> points;
+};
+
+/// A label and a text.
+using ReportEntry = std::pair<std::string, std::string>;
+
+/// Everything the page shows. Only `rows` must be filled.
+struct RunReport {
+  std::string title{"searvins run"};
+  std::string subtitle{};  ///< a sentence below the title
+  std::string command{};   ///< the command line that made it
+  std::vector<io::TrajectoryRow> rows{};
+  std::vector<ReportEpoch> epochs{};  ///< as many as rows, or none
+  std::vector<std::string> rejection_reasons{};
+  std::vector<std::string> fix_outcomes{};    ///< the first one is "fixed": it is drawn in the colour of a fix
+  std::optional<double> success_rate_gate{};  ///< drawn into the success-rate chart
+  std::vector<ReportSatellite> satellites{};
+  std::optional<TruthTrack> truth{};
+  std::optional<Evaluation> evaluation{};  ///< scores for tiles, table and error distribution
+  std::vector<ReportEntry> figures{};      ///< further lines of the table of figures
+  std::vector<ReportEntry> settings{};
+  std::vector<std::string> notes{};  ///< what was skipped and why
+};
+
+}  // namespace searvins::examples

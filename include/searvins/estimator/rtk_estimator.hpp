@@ -1,0 +1,725 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// \file
+/// RTK from two receivers: the estimator that a GNSS-only user touches.
+///
+/// One rover epoch goes this way:
+///
+///     track       single point and Doppler: receiver clock offset, hence the time of the state, and a coarse position
+///     difference  screened, base-corrected single differences in groups with a pivot            (gnss/double_difference.hpp)
+///     start       robust position of the epoch by graduated non-convexity                         (estimator/snapshot.hpp)
+///     extend      a state, its motion factor, code, phase and Doppler batches, ambiguities by hybrid continuation
+///     float       optimise with every integer constraint switched off; marginalise what is older than the lag
+///     resolve     LAMBDA on the joint marginal of that very float, gates                          (ambiguity/resolution.hpp)
+///     fix         integer constraints on, optimise again; contradicted ones are taken back
+///
+/// A wrong fix cannot confirm itself: float and covariance that integers are judged by, and the prior that leaves the window, never contain an earlier
+/// integer. Integers held in the window only shape the solution that is output between fixes.
+///
+/// The object is some tens of megabytes with HostedCapacity and never allocates: create it once, static or on the heap, never as a local.
+#pragma once
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include <searvins/ambiguity/continuation.hpp>
+#include <searvins/ambiguity/resolution.hpp>
+#include <searvins/estimator/rtk_options.hpp>
+#include <searvins/estimator/rtk_problem.hpp>
+#include <searvins/estimator/rtk_solution.hpp>
+#include <searvins/estimator/snapshot.hpp>
+#include <searvins/geodesy/local_frame.hpp>
+#include <searvins/gnss/base_buffer.hpp>
+#include <searvins/gnss/double_difference.hpp>
+#include <searvins/gnss/ephemeris.hpp>
+#include <searvins/gnss/single_point_tracker.hpp>
+
+namespace searvins::estimator {
+
+template <class Config>
+class RtkEstimator {
+ public:
+  using Cap = typename Config::Capacity;
+  using Problem = RtkProblem<Config>;
+  using Smoother = smoother::FixedLagSmoother<Problem>;
+  using CodePhaseForm = typename Config::CodePhaseForm;
+  using DopplerForm = typename Config::DopplerForm;
+
+  /// Settings of the robust policies are those of the forms themselves (their `loss`).
+  explicit RtkEstimator(const RtkOptions& options = {}, const CodePhaseForm& code_phase = {}, const DopplerForm& doppler = {})
+      : options_(options), code_phase_form_(code_phase), doppler_form_(doppler), tracker_(options.tracker) {
+    continuation_.mode = options.continuity;
+    continuation_.max_arc_epochs = options.arc_epochs;
+  }
+
+  /// Broadcast records. Errors: capacity_exceeded.
+  Status add_ephemeris(const gnss::Ephemeris& e) {
+    return ephemerides_.insert(e) ? ok_status() : failure(StatusCode::capacity_exceeded, "the ephemeris store is full: raise Capacity::ephemerides");
+  }
+  void set_ionosphere(const gnss::KlobucharCoefficients& k) { ephemerides_.ionosphere = k; }
+  /// Base antenna, ECEF metres. Errors: non_finite, invalid_argument.
+  Status set_base_position(const Eigen::Vector3d& position_e_m) { return base_.set_position(position_e_m); }
+  /// A base epoch, in time order. Errors: duplicate, out_of_order.
+  Status add_base(const gnss::ObservationEpoch& epoch) { return base_.push(epoch); }
+
+  /// One rover epoch. A refused epoch (out_of_order, duplicate; no position at all yet: the tracker's status) leaves the estimator as it was; otherwise
+  /// there is a solution, labelled with what it rests on.
+  Result<RtkSolution> update(const gnss::ObservationEpoch& rover) {
+    if (started_ && rover.tag <= last_tag_)
+      return failure(rover.tag == last_tag_ ? StatusCode::duplicate : StatusCode::out_of_order, "rover epoch not after the last one", -1, -1, seconds_between(last_tag_, rover.tag));
+    const Result<gnss::TrackedPosition> tracked = tracker_.update(rover, ephemerides_);
+    if (!tracked.ok() && !window_running()) return tracked.status();
+    RtkSolution out = begin(rover, tracked);
+    started_ = true, last_tag_ = rover.tag;
+    const Status differenced = difference(rover, tracked, out);
+    if (!differenced.ok() || usable_satellites() < options_.min_satellites) {
+      continuation_.skip_epoch();
+      return without_differences(tracked, out), out;
+    }
+    extend(tracked, out);
+    estimate(out);
+    return out;
+  }
+
+  /// The differenced epoch of the last update, for reports.
+  [[nodiscard]] const gnss::DifferencedEpoch& differenced() const { return epoch_; }
+  /// Single-point solution rows of the last update, for reports (empty when it coasted).
+  [[nodiscard]] const gnss::SinglePointSolution& single_point() const { return single_point_; }
+  [[nodiscard]] const Smoother& smoother() const { return smoother_; }
+  [[nodiscard]] const RtkOptions& options() const { return options_; }
+  /// The local frame of the window: East-North-Up where it was started.
+  [[nodiscard]] const geodesy::LocalFrame& frame() const { return frame_; }
+
+  /// The smoothed estimate of the oldest epoch of the window: what is known `lag_s` later. nullptr while there is no window.
+  struct LaggedState {
+    GpsTime time{};
+    Eigen::Vector3d position_e_m{Eigen::Vector3d::Zero()};
+    SolutionStatus status{SolutionStatus::dr};
+  };
+  [[nodiscard]] Result<LaggedState> oldest() const {
+    if (!window_running()) return failure(StatusCode::no_data, "no window is running");
+    const Node& n = nodes_.front();
+    return LaggedState{n.time, frame_.to_ecef(smoother_.find(n.state)->p_wa_m), n.status};
+  }
+
+ private:
+  using AmbiguityKey = smoother::Key<gnss::Ambiguity>;
+  static constexpr int kPhases = Cap::phases_per_epoch;
+  static constexpr std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+  /// A state of the window.
+  struct Node {
+    smoother::Key<gnss::Pva> state{};
+    GpsTime time{};
+    SolutionStatus status{SolutionStatus::dr};
+  };
+  /// A double-difference ambiguity of the present epoch: a, minus b when states are single differences.
+  struct Difference {
+    AmbiguityKey a{}, b{};
+    ambiguity::ArcId arc{};
+  };
+  /// An integer constraint in the window.
+  struct Held {
+    smoother::Key<gnss::IntegerFix> factor{};
+    Difference difference{};
+    std::int64_t integer{0};
+  };
+
+  [[nodiscard]] bool window_running() const { return !nodes_.empty(); }
+
+  // ---- begin: time and prediction --------------------------------------------------------------------------------------------------------
+
+  [[nodiscard]] RtkSolution begin(const gnss::ObservationEpoch& rover, const Result<gnss::TrackedPosition>& tracked) {
+    RtkSolution out;
+    out.tag = rover.tag;
+    if (tracked.ok()) {
+      single_point_ = tracked->single_point;
+      clock_offset_s_ = seconds_between(tracked->time, rover.tag);
+    } else {
+      single_point_ = {};
+    }
+    out.clock_offset_s = clock_offset_s_;
+    out.time = tracked.ok() ? tracked->time : rover.tag.plus_seconds(-clock_offset_s_);
+    if (window_running() && seconds_between(nodes_.back().time, out.time) > options_.max_gap_s) restart();
+    return out;
+  }
+
+  [[nodiscard]] double since_last(const RtkSolution& out) const { return seconds_between(nodes_.back().time, out.time); }
+
+  /// The window's prediction is worth starting from when it is not older than this.
+  static constexpr double kTrustedPredictionS = 2.5;
+
+  /// Where the epoch probably is, before its differences are looked at, with a sigma.
+  void predict(const Result<gnss::TrackedPosition>& tracked, const RtkSolution& out) {
+    const bool from_window = window_running() && (since_last(out) <= kTrustedPredictionS || !tracked.ok());
+    if (from_window) {
+      const gnss::Pva x = smoother_.find(nodes_.back().state)->predict(since_last(out));
+      const double dt = since_last(out);
+      predicted_e_m_ = frame_.to_ecef(x.p_wa_m);
+      predicted_v_e_mps_ = frame_.R_ew * x.v_wa_mps;
+      predicted_sigma_m_ = std::sqrt(last_variance_m2_ + dt * dt * last_velocity_variance_ + options_.jerk_psd_m2ps5 * std::pow(dt, 5) / 20);
+    } else {
+      predicted_e_m_ = tracked->position_e_m;
+      predicted_v_e_mps_ = tracked->velocity_e_mps;
+      predicted_sigma_m_ = std::max(2.0, 2 * std::sqrt(tracked->position_covariance_m2.trace()));
+    }
+  }
+
+  // ---- difference ------------------------------------------------------------------------------------------------------------------------
+
+  Status difference(const gnss::ObservationEpoch& rover, const Result<gnss::TrackedPosition>& tracked, RtkSolution& out) {
+    predict(tracked, out);
+    const Status s = differencer_.difference(rover, base_, ephemerides_, predicted_e_m_, options_.differencing, epoch_);
+    if (!s.ok()) return s;
+    if (epoch_.base_status.ok()) out.base_age_s = epoch_.base_age_s;
+    return epoch_.base_status;
+  }
+
+  [[nodiscard]] int usable_satellites() const {
+    int n = 0;
+    gnss::SatelliteId last{};
+    for (const gnss::CorrectedSignal& s : epoch_.signals) {  // sorted by satellite
+      if (s.satellite == last) continue;
+      last = s.satellite;
+      ++n;
+    }
+    return n;
+  }
+
+  /// Without double differences: the better of prediction and single point, said so.
+  void without_differences(const Result<gnss::TrackedPosition>& tracked, RtkSolution& out) {
+    out.satellites = tracked.ok() ? single_point_.used : 0;
+    if (tracked.ok() && tracked->status != gnss::TrackStatus::coasted) {
+      out.status = SolutionStatus::spp;
+      set_from_tracker(*tracked, out);
+    } else if (tracked.ok()) {
+      out.status = SolutionStatus::dr;
+      set_from_tracker(*tracked, out);
+    } else {
+      out.status = SolutionStatus::dr;
+      out.position_e_m = predicted_e_m_, out.velocity_e_mps = predicted_v_e_mps_;
+      out.covariance_enu_m2 = Eigen::Matrix3d::Identity() * predicted_sigma_m_ * predicted_sigma_m_;
+      out.velocity_covariance_enu = Eigen::Matrix3d::Identity() * last_velocity_variance_;
+    }
+  }
+  static void set_from_tracker(const gnss::TrackedPosition& t, RtkSolution& out) {
+    const Eigen::Matrix3d R_ew = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(t.position_e_m));
+    out.position_e_m = t.position_e_m, out.velocity_e_mps = t.velocity_e_mps;
+    out.covariance_enu_m2 = R_ew.transpose() * t.position_covariance_m2 * R_ew;
+    out.velocity_covariance_enu = R_ew.transpose() * t.velocity_covariance_m2ps2 * R_ew;
+  }
+
+  // ---- extend: state, factors, ambiguities -----------------------------------------------------------------------------------------------
+
+  void extend(const Result<gnss::TrackedPosition>& tracked, RtkSolution& out) {
+    (void)tracked;
+    out.satellites = usable_satellites();
+    continuation_.begin_epoch();
+    select_phases();
+    const Eigen::Vector3d start_e_m = snapshot_position();
+    if (!window_running()) {
+      frame_ = geodesy::LocalFrame::at(start_e_m);
+      out.restarted = true;
+    }
+    gnss::Pva start;
+    start.p_wa_m = frame_.to_local(start_e_m);
+    start.v_wa_mps = frame_.R_ew.transpose() * predicted_v_e_mps_;
+    if (window_running()) start.a_wa_mps2 = smoother_.find(nodes_.back().state)->a_wa_mps2;
+    while (nodes_.full()) marginalise_oldest();
+    const auto state = smoother_.add_variable(start, out.time);
+    if (!state.ok()) {
+      out.smoother_status = state.status();
+      return;
+    }
+    if (window_running())
+      add(gnss::WhiteJerkFactor{nodes_.back().state, *state, std::max(1e-3, since_last(out)), options_.jerk_psd_m2ps5}, out);
+    else
+      add(gnss::PvaPriorFactor{*state, start, options_.start_sigma_m, options_.start_velocity_sigma_mps, options_.start_acceleration_sigma_mps2}, out);
+    (void)nodes_.push_back({*state, out.time, SolutionStatus::dr});
+    code_keys_.clear(), phase_keys_.clear(), differences_.clear();
+    for (int g = 0; g < static_cast<int>(epoch_.groups.size()); ++g) add_group(g, *state, start_e_m, out);
+    if (options_.use_doppler) add_doppler(*state, out);
+  }
+
+  template <class F>
+  smoother::Key<F> add(const F& factor, RtkSolution& out) {
+    const auto key = smoother_.add_factor(factor);
+    if (!key.ok()) {
+      out.smoother_status = key.status();
+      return {};
+    }
+    return *key;
+  }
+
+  /// Which signals bring their phase: all, or the highest when there are more than an epoch may hold.
+  void select_phases() {
+    phase_usable_.clear();
+    StaticVector<double, gnss::kMaxCorrectedSignals> elevations;
+    for (const gnss::CorrectedSignal& s : epoch_.signals)
+      if (options_.use_phase && std::isfinite(s.phase_m)) (void)elevations.push_back(s.elevation_rad);
+    double lowest = -10;
+    if (elevations.size() > at(kPhases)) {
+      std::nth_element(elevations.begin(), elevations.end() - kPhases, elevations.end());
+      lowest = elevations[elevations.size() - at(kPhases)];
+    }
+    int taken = 0;
+    for (const gnss::CorrectedSignal& s : epoch_.signals) {
+      const bool use = options_.use_phase && std::isfinite(s.phase_m) && s.elevation_rad >= lowest && taken < kPhases;
+      taken += use ? 1 : 0;
+      (void)phase_usable_.push_back(use);
+    }
+  }
+
+  [[nodiscard]] static ambiguity::ArcId arc_of(const gnss::CorrectedSignal& s) { return {s.satellite, s.rover_signal, s.base_signal}; }
+
+  /// Pivot of a group's phases: the group's own, or the highest satellite with a phase when that has none. -1: fewer than two phases.
+  [[nodiscard]] int phase_pivot(const gnss::SignalGroup& group) const {
+    int best = -1, count = 0;
+    const auto consider = [&](int i) {
+      if (!phase_usable_[at(i)]) return;
+      ++count;
+      if (best < 0 || epoch_.signals[at(i)].elevation_rad > epoch_.signals[at(best)].elevation_rad) best = i;
+    };
+    consider(group.pivot);
+    if (count == 1) {
+      for (std::uint16_t c : group.candidates) count += phase_usable_[c] ? 1 : 0;
+      return count >= 2 ? group.pivot : -1;
+    }
+    for (std::uint16_t c : group.candidates) consider(c);
+    return count >= 2 ? best : -1;
+  }
+
+  /// The state that a continued or walked phase would use, or an invalid key.
+  [[nodiscard]] AmbiguityKey past_state(const gnss::CorrectedSignal& s, gnss::SatelliteId pivot) const {
+    const auto* arc = continuation_.find(arc_of(s));
+    if (!arc || continuation_.decide(arc_of(s), s.continuity == gnss::Continuity::verified, pivot) == ambiguity::Transition::fresh) return {};
+    return smoother_.find(arc->handle) ? arc->handle : AmbiguityKey{};
+  }
+  [[nodiscard]] gnss::SatelliteId pivot_id(int pivot) const {
+    return options_.handover == PivotHandover::exact ? gnss::SatelliteId{} : epoch_.signals[at(pivot)].satellite;
+  }
+
+  /// Codes and continued phases of the epoch, for the start of Gauss-Newton.
+  [[nodiscard]] Eigen::Vector3d snapshot_position() {
+    snapshot_.rows.clear();
+    snapshot_.predicted_e_m = predicted_e_m_;
+    snapshot_.predicted_sigma_m = predicted_sigma_m_;
+    std::uint16_t group_number = 0;
+    for (const gnss::SignalGroup& group : epoch_.groups) {
+      const auto each = [&](auto&& fn) {
+        fn(group.pivot);
+        for (std::uint16_t c : group.candidates) fn(static_cast<int>(c));
+      };
+      each([&](int i) {
+        const gnss::CorrectedSignal& s = epoch_.signals[at(i)];
+        (void)snapshot_.rows.push_back({s.satellite_e_m, s.code_m, s.code_variance_m2, group_number});
+      });
+      ++group_number;
+      const int pivot = phase_pivot(group);
+      if (pivot >= 0)
+        each([&](int i) {
+          if (!phase_usable_[at(i)]) return;
+          const gnss::CorrectedSignal& s = epoch_.signals[at(i)];
+          const bool is_zero = options_.handover == PivotHandover::restart && i == pivot;  // the pivot's double difference with itself
+          const AmbiguityKey past = is_zero ? AmbiguityKey{} : past_state(s, pivot_id(pivot));
+          if (!is_zero && !past.valid()) return;
+          const double n = is_zero ? 0.0 : smoother_.find(past)->value;
+          (void)snapshot_.rows.push_back({s.satellite_e_m, s.phase_m - s.wavelength_m * n, s.phase_variance_m2, group_number});
+        });
+      ++group_number;
+    }
+    return snapshot_.solve();
+  }
+
+  void add_group(int g, smoother::Key<gnss::Pva> state, const Eigen::Vector3d& start_e_m, RtkSolution& out) {
+    const gnss::SignalGroup& group = epoch_.groups[at(g)];
+    typename Problem::CodeFactor code;
+    begin_batch(code, state, group.pivot);
+    const auto is_room = [](const auto& f) { return !f.candidates.full(); };
+    std::array<double, static_cast<std::size_t>(Cap::candidates)> variances{};
+    for (std::uint16_t c : group.candidates)
+      if (is_room(code)) {
+        variances[code.candidates.size()] = epoch_.signals[c].code_variance_m2;
+        (void)code.candidates.push_back({epoch_.signals[c].satellite_e_m, epoch_.signals[c].code_m});
+      }
+    code.pivot.z = epoch_.signals[at(group.pivot)].code_m;
+    finish_batch(code, variances.data(), epoch_.signals[at(group.pivot)].code_variance_m2, code_phase_form_, out, code_keys_);
+
+    const int pivot = phase_pivot(group);
+    if (pivot < 0) return;
+    typename Problem::PhaseFactor phase;
+    begin_batch(phase, state, pivot);
+    phase.wavelength_m = group.wavelength_m;
+    phase.pivot.z = epoch_.signals[at(pivot)].phase_m;
+    const bool exact = options_.handover == PivotHandover::exact;
+    const double reference_m = phase_reference(group, pivot, start_e_m);
+    if (exact) phase.pivot_ambiguity = ambiguity_state(pivot, pivot, reference_m, start_e_m, out);
+    if (exact && !phase.pivot_ambiguity.valid()) return;
+    const auto add_candidate = [&](int i) {
+      if (i == pivot || !phase_usable_[at(i)] || !is_room(phase)) return;
+      const gnss::CorrectedSignal& s = epoch_.signals[at(i)];
+      const AmbiguityKey key = ambiguity_state(i, pivot, reference_m, start_e_m, out);
+      if (!key.valid()) return;
+      variances[phase.candidates.size()] = s.phase_variance_m2;
+      (void)phase.candidates.push_back({s.satellite_e_m, s.phase_m});
+      (void)phase.ambiguities.push_back(key);
+      (void)differences_.push_back({key, phase.pivot_ambiguity, arc_of(s)});
+    };
+    add_candidate(group.pivot);
+    for (std::uint16_t c : group.candidates) add_candidate(c);
+    out.phases += phase.size();
+    finish_batch(phase, variances.data(), epoch_.signals[at(pivot)].phase_variance_m2, code_phase_form_, out, phase_keys_);
+  }
+
+  template <class F>
+  void begin_batch(F& factor, smoother::Key<gnss::Pva> state, int pivot) const {
+    factor.state = state;
+    factor.frame = frame_;
+    factor.pivot.satellite_e_m = epoch_.signals[at(pivot)].satellite_e_m;
+  }
+
+  /// Covariance, form, latent start; then into the window.
+  template <class F, class Form, class Keys>
+  void finish_batch(F& factor, const double* variances, double pivot_variance, const Form& form, RtkSolution& out, Keys& keys) {
+    if (factor.candidates.empty()) return;
+    const auto covariance = robust::SharedPivot<double, static_cast<int>(decltype(factor.candidates)::capacity())>::from(variances, factor.size(), pivot_variance);
+    if (!covariance.ok()) {
+      out.smoother_status = covariance.status();
+      return;
+    }
+    factor.covariance = *covariance;
+    factor.formulation = form;
+    if constexpr (Form::has_latent) {
+      const typename Smoother::WindowType::template Values<smoother::Which::estimate> values{smoother_.window()};
+      gnss::PivotError start;
+      start.value = factor.initial_latent(values);
+      const auto latent = smoother_.add_variable(start, out.time);
+      if (!latent.ok()) {
+        out.smoother_status = latent.status();
+        return;
+      }
+      factor.latent = *latent;
+    }
+    const auto key = add(factor, out);
+    if (key.valid()) (void)keys.push_back(key);
+    out.double_differences += factor.size();
+  }
+
+  /// Level, in metres, from which the fresh ambiguities of a group are counted, so that their phases agree with the start position:
+  /// lambda N_i = phase_i - range_i - level. From a state that goes on, else from the pivot's code.
+  [[nodiscard]] double phase_reference(const gnss::SignalGroup& group, int pivot, const Eigen::Vector3d& start_e_m) const {
+    const auto level = [&](int i, double n_cycles) {
+      const gnss::CorrectedSignal& s = epoch_.signals[at(i)];
+      return s.phase_m - gnss::range_m(start_e_m, s.satellite_e_m) - s.wavelength_m * n_cycles;
+    };
+    if (options_.handover == PivotHandover::restart) return level(pivot, 0);
+    double sum = 0;
+    int count = 0;
+    const auto consider = [&](int i) {
+      if (!phase_usable_[at(i)]) return;
+      const AmbiguityKey past = past_state(epoch_.signals[at(i)], {});
+      if (past.valid()) sum += level(i, smoother_.find(past)->value), ++count;
+    };
+    consider(group.pivot);
+    for (std::uint16_t c : group.candidates) consider(c);
+    if (count > 0) return sum / count;
+    const gnss::CorrectedSignal& s = epoch_.signals[at(pivot)];
+    return s.code_m - gnss::range_m(start_e_m, s.satellite_e_m);
+  }
+
+  /// The ambiguity state of a signal at this epoch: continued, walked or fresh.
+  [[nodiscard]] AmbiguityKey ambiguity_state(int i, int pivot, double reference_m, const Eigen::Vector3d& start_e_m, RtkSolution& out) {
+    const gnss::CorrectedSignal& s = epoch_.signals[at(i)];
+    const ambiguity::ArcId id = arc_of(s);
+    ambiguity::Transition transition = continuation_.decide(id, s.continuity == gnss::Continuity::verified, pivot_id(pivot));
+    const AmbiguityKey past = past_state(s, pivot_id(pivot));
+    if (!past.valid()) transition = ambiguity::Transition::fresh;
+    if (transition == ambiguity::Transition::continued) {
+      (void)continuation_.record(id, transition, past, pivot_id(pivot));
+      return past;
+    }
+    gnss::Ambiguity start;
+    start.value = transition == ambiguity::Transition::walked ? smoother_.find(past)->value
+                                                              : (s.phase_m - gnss::range_m(start_e_m, s.satellite_e_m) - reference_m) / s.wavelength_m;
+    const auto key = smoother_.add_variable(start, out.time);
+    if (!key.ok()) {
+      out.smoother_status = key.status();
+      return {};
+    }
+    if (transition == ambiguity::Transition::walked)
+      add(gnss::AmbiguityWalk{*key, past, 0, options_.walk_sigma_cycles}, out);
+    else
+      add(gnss::AmbiguityDatum{*key, {}, start.value, options_.datum_sigma_cycles}, out);
+    if (!continuation_.record(id, transition, *key, pivot_id(pivot))) out.smoother_status = failure(StatusCode::capacity_exceeded, "more ambiguity arcs than the table holds");
+    return *key;
+  }
+
+  void add_doppler(smoother::Key<gnss::Pva> state, RtkSolution& out) {
+    if (epoch_.doppler_pivot < 0 || epoch_.doppler.size() < 2) return;
+    typename Problem::DopplerFactor factor;
+    factor.state = state;
+    factor.frame = frame_;
+    std::array<double, static_cast<std::size_t>(Cap::doppler_candidates)> variances{};
+    for (std::size_t i = 0; i < epoch_.doppler.size(); ++i) {
+      const gnss::DopplerMeasurement& d = epoch_.doppler[i];
+      if (static_cast<int>(i) == epoch_.doppler_pivot) {
+        factor.pivot = {d.unit_e, d.rate_mps};
+      } else if (!factor.candidates.full()) {
+        variances[factor.candidates.size()] = d.variance_m2ps2;
+        (void)factor.candidates.push_back({d.unit_e, d.rate_mps});
+      }
+    }
+    const int before = out.double_differences;
+    StaticVector<smoother::Key<typename Problem::DopplerFactor>, 1> keys;
+    finish_batch(factor, variances.data(), epoch_.doppler[at(epoch_.doppler_pivot)].variance_m2ps2, doppler_form_, out, keys);
+    out.double_differences = before;
+  }
+
+  // ---- estimate: float, marginalise, resolve, fix ------------------------------------------------------------------------------------------
+
+  void estimate(RtkSolution& out) {
+    smoother_.template set_enabled<gnss::IntegerFix>(false);
+    if (!optimise(out)) return recover(out);
+    out.status = out.phases > 0 ? SolutionStatus::float_ : SolutionStatus::dgnss;
+    const bool have_float = collect_float(out);
+    while (is_window_long(out)) marginalise_oldest();
+    forget_gone_integers();
+    release_contradicted(out);
+    StaticVector<smoother::Key<gnss::IntegerFix>, kPhasesSize> fresh;
+    if (have_float) resolve(out, fresh);
+    if (!held_.empty()) {
+      smoother_.template set_enabled<gnss::IntegerFix>(true);
+      if (!optimise(out)) return recover(out);
+      if (!fresh.empty() && is_suspect()) take_back(fresh, out);
+    }
+    if (out.verdict == ambiguity::ResolutionVerdict::accepted) out.status = SolutionStatus::fix;
+    write(out);
+    if (options_.fix_memory == FixMemory::epoch) release_all();
+    out.held_integers = static_cast<int>(held_.size());
+    watch_divergence(out);
+  }
+  static constexpr std::size_t kPhasesSize = static_cast<std::size_t>(kPhases);
+
+  bool optimise(RtkSolution& out) {
+    const auto report = smoother_.optimise(options_.solver);
+    out.iterations += report.iterations;
+    out.smoother_status = report.status;
+    return report.status.ok() || report.status.code == StatusCode::not_converged;
+  }
+
+  /// The window could not be solved: it is dropped, the epoch answers from its own start.
+  void recover(RtkSolution& out) {
+    const gnss::Pva* x = smoother_.find(nodes_.back().state);
+    out.status = SolutionStatus::dgnss;
+    out.position_e_m = frame_.to_ecef(x->p_wa_m), out.velocity_e_mps = frame_.R_ew * x->v_wa_mps;
+    out.covariance_enu_m2 = Eigen::Matrix3d::Identity() * std::max(25.0, predicted_sigma_m_ * predicted_sigma_m_);
+    out.velocity_covariance_enu = Eigen::Matrix3d::Identity();
+    out.verdict = ambiguity::ResolutionVerdict::ill_conditioned;
+    restart();
+  }
+
+  [[nodiscard]] bool is_window_long(const RtkSolution& out) const {
+    return static_cast<int>(nodes_.size()) > options_.arc_epochs + 1 && seconds_between(nodes_.front().time, out.time) > options_.lag_s;
+  }
+
+  void marginalise_oldest() {
+    const auto report = smoother_.marginalise_oldest(options_.solver);
+    if (report.status.ok())
+      nodes_.erase(0);
+    else
+      restart();
+  }
+
+  /// The float double differences of this epoch with their joint covariance with the position. False when there is nothing to resolve.
+  [[nodiscard]] bool collect_float(RtkSolution& out) {
+    out.verdict = options_.resolution.mode == ambiguity::ResolutionMode::off ? ambiguity::ResolutionVerdict::off : ambiguity::ResolutionVerdict::too_few;
+    float_.n = 0;
+    if (differences_.empty() || options_.resolution.mode == ambiguity::ResolutionMode::off) return false;
+    keys_.clear();
+    (void)keys_.push_back(Smoother::WindowType::any(nodes_.back().state));
+    for (std::size_t k = 0; k < differences_.size(); ++k) {
+      a_column_[k] = column_of(differences_[k].a);
+      b_column_[k] = differences_[k].b.valid() ? column_of(differences_[k].b) : -1;
+    }
+    const int n = 9 + static_cast<int>(keys_.size()) - 1;
+    const auto size = smoother_.joint_covariance(keys_.data(), static_cast<int>(keys_.size()), joint_.data(), n);
+    if (!size.ok()) return false;
+    const auto cov = [&](int i, int j) { return j < 0 || i < 0 ? 0.0 : joint_[at(j) * at(n) + at(i)]; };
+    float_.n = static_cast<int>(differences_.size());
+    // Rotation from the window's axes to East-North-Up at the position is below 1e-5 over 60 m, and gates want no more.
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b) float_.Q_pp(a, b) = cov(a, b);
+    for (int i = 0; i < float_.n; ++i) {
+      const int ai = a_column_[at(i)], bi = b_column_[at(i)];
+      const Difference& d = differences_[at(i)];
+      float_.a_cycles[at(i)] = smoother_.find(d.a)->value - (d.b.valid() ? smoother_.find(d.b)->value : 0.0);
+      for (int axis = 0; axis < 3; ++axis) float_.Q_pa[at(i)][axis] = cov(axis, ai) - cov(axis, bi);
+      for (int j = 0; j <= i; ++j) {
+        const int aj = a_column_[at(j)], bj = b_column_[at(j)];
+        const double q = cov(ai, aj) - cov(ai, bj) - cov(bi, aj) + cov(bi, bj);
+        float_.Q_aa[at(i) * kPhasesSize + at(j)] = float_.Q_aa[at(j) * kPhasesSize + at(i)] = q;
+      }
+    }
+    return true;
+  }
+
+  /// Column of an ambiguity in the joint covariance; it is added to the keys when it is new.
+  [[nodiscard]] int column_of(const AmbiguityKey& key) {
+    const smoother::AnyKey any = Smoother::WindowType::any(key);
+    for (std::size_t k = 1; k < keys_.size(); ++k)
+      if (keys_[k] == any) return 8 + static_cast<int>(k);
+    (void)keys_.push_back(any);
+    return 8 + static_cast<int>(keys_.size()) - 1;
+  }
+
+  void resolve(RtkSolution& out, StaticVector<smoother::Key<gnss::IntegerFix>, kPhasesSize>& fresh) {
+    resolver_.resolve(float_, options_.resolution, outcome_);
+    out.verdict = outcome_.verdict, out.success_rate = outcome_.success_rate, out.ratio = outcome_.ratio;
+    if (!outcome_.accepted()) return;
+    for (int i = 0; i < float_.n; ++i) {
+      if (!outcome_.fixed[at(i)]) continue;
+      const Difference& d = differences_[at(i)];
+      release_if([&](const Held& h) { return h.difference.a == d.a; }, out, false);  // one constraint a state
+      const auto key = add(gnss::IntegerFix{d.a, d.b, static_cast<double>(outcome_.integers[at(i)]), options_.fix_sigma_cycles}, out);
+      if (!key.valid()) continue;
+      (void)held_.push_back({key, d, outcome_.integers[at(i)]});
+      (void)fresh.push_back(key);
+      ++out.fixed_phases;
+    }
+  }
+
+  /// Integers of earlier epochs that the float without them contradicts, or that a newly resolved state would get another value for.
+  void release_contradicted(RtkSolution& out) {
+    for (std::size_t i = 0; i < held_.size();) {
+      const Held h = held_[i];
+      bool contradicted = false;
+      for (int k = 0; k < float_.n; ++k) {
+        const Difference& d = differences_[at(k)];
+        if (!(d.a == h.difference.a) || !(d.b == h.difference.b)) continue;
+        const double sigma = std::sqrt(std::max(1e-6, float_.Q_aa[at(k) * kPhasesSize + at(k)]));
+        contradicted = std::abs(float_.a_cycles[at(k)] - static_cast<double>(h.integer)) > options_.release_sigmas * sigma;
+      }
+      if (!contradicted) {
+        ++i;
+        continue;
+      }
+      (void)smoother_.remove_factor(h.factor);
+      continuation_.forget(h.difference.arc);
+      held_.erase(i);
+      ++out.released_integers;
+    }
+  }
+
+  template <class Predicate>
+  void release_if(Predicate gone, RtkSolution& out, bool count) {
+    held_.erase_if([&](const Held& h) {
+      if (!gone(h)) return false;
+      (void)smoother_.remove_factor(h.factor);
+      out.released_integers += count ? 1 : 0;
+      return true;
+    });
+  }
+  void release_all() {
+    for (const Held& h : held_) (void)smoother_.remove_factor(h.factor);
+    held_.clear();
+  }
+  void forget_gone_integers() {
+    held_.erase_if([this](const Held& h) { return smoother_.find_factor(h.factor) == nullptr; });
+  }
+
+  /// Whether the re-optimised window fights the integers: too many phases of this epoch lost their weight.
+  [[nodiscard]] bool is_suspect() {
+    int low = 0, all = 0;
+    for (const auto& key : phase_keys_) {
+      const double* w = smoother_.weights(key);
+      const auto* f = smoother_.find_factor(key);
+      for (int i = 0; w && i < f->size(); ++i) ++all, low += w[i] < 0.5 ? 1 : 0;
+    }
+    return all > 0 && low > options_.max_suspect_share * all;
+  }
+
+  void take_back(const StaticVector<smoother::Key<gnss::IntegerFix>, kPhasesSize>& fresh, RtkSolution& out) {
+    release_if([&](const Held& h) { return std::find(fresh.begin(), fresh.end(), h.factor) != fresh.end(); }, out, true);
+    out.verdict = ambiguity::ResolutionVerdict::contradiction;
+    out.fixed_phases = 0;
+    (void)optimise(out);
+  }
+
+  void write(RtkSolution& out) {
+    const gnss::Pva& x = *smoother_.find(nodes_.back().state);
+    out.position_e_m = frame_.to_ecef(x.p_wa_m);
+    out.velocity_e_mps = frame_.R_ew * x.v_wa_mps;
+    const auto P = smoother_.covariance(nodes_.back().state);
+    if (P.ok()) {
+      const Eigen::Matrix3d R = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(out.position_e_m)).transpose() * frame_.R_ew;
+      out.covariance_enu_m2 = R * P->template topLeftCorner<3, 3>() * R.transpose();
+      out.velocity_covariance_enu = R * P->template block<3, 3>(3, 3) * R.transpose();
+    }
+    last_variance_m2_ = std::max(1e-4, out.covariance_enu_m2.trace());
+    last_velocity_variance_ = std::max(1e-4, out.velocity_covariance_enu.trace());
+    nodes_.back().status = out.status;
+    out.code_weight = mean_weight(code_keys_);
+    out.phase_weight = mean_weight(phase_keys_);
+  }
+
+  template <class Keys>
+  [[nodiscard]] double mean_weight(const Keys& keys) {
+    double sum = 0;
+    int n = 0;
+    for (const auto& key : keys) {
+      const double* w = smoother_.weights(key);
+      const auto* f = smoother_.find_factor(key);
+      for (int i = 0; w && i < f->size(); ++i) sum += w[i], ++n;
+    }
+    return n > 0 ? sum / n : 0;
+  }
+
+  /// A window whose codes mostly disagree with it, epoch after epoch, has drifted away: the next epoch starts anew.
+  void watch_divergence(RtkSolution& out) {
+    suspect_epochs_ = out.code_weight < 0.3 && !code_keys_.empty() ? suspect_epochs_ + 1 : 0;
+    if (suspect_epochs_ >= options_.min_suspect_epochs) restart();
+  }
+
+  /// Drops the window. Ephemerides, base and slip detection stay.
+  void restart() {
+    smoother_.clear();
+    nodes_.clear(), held_.clear(), code_keys_.clear(), phase_keys_.clear(), differences_.clear();
+    continuation_.clear();
+    suspect_epochs_ = 0;
+  }
+
+  RtkOptions options_;
+  CodePhaseForm code_phase_form_;
+  DopplerForm doppler_form_;
+  gnss::SinglePointTracker tracker_;
+  gnss::EphemerisStore<Cap::ephemerides> ephemerides_{};
+  gnss::BaseBuffer<Cap::base_epochs> base_{};
+  gnss::Differencer differencer_{};
+  gnss::DifferencedEpoch epoch_{};
+  gnss::SinglePointSolution single_point_{};
+  Smoother smoother_{};
+  ambiguity::Continuation<AmbiguityKey, 2 * kPhasesSize> continuation_{};
+  ambiguity::Resolver<kPhases> resolver_{};
+  ambiguity::FloatAmbiguities<kPhases> float_{};
+  ambiguity::ResolutionOutcome<kPhases> outcome_{};
+  geodesy::LocalFrame frame_{};
+  StaticVector<Node, static_cast<std::size_t>(Cap::states)> nodes_{};
+  StaticVector<Held, static_cast<std::size_t>(Cap::fixes)> held_{};
+  StaticVector<Difference, kPhasesSize> differences_{};
+  StaticVector<bool, gnss::kMaxCorrectedSignals> phase_usable_{};
+  StaticVector<smoother::Key<typename Problem::CodeFactor>, gnss::kMaxSignalGroups> code_keys_{};
+  StaticVector<smoother::Key<typename Problem::PhaseFactor>, gnss::kMaxSignalGroups> phase_keys_{};
+  StaticVector<smoother::AnyKey, 2 * kPhasesSize + 1> keys_{};
+  std::array<int, kPhasesSize> a_column_{}, b_column_{};
+  std::array<double, (2 * kPhasesSize + 9) * (2 * kPhasesSize + 9)> joint_{};
+  Snapshot<2 * gnss::kMaxCorrectedSignals> snapshot_{};
+  Eigen::Vector3d predicted_e_m_{Eigen::Vector3d::Zero()}, predicted_v_e_mps_{Eigen::Vector3d::Zero()};
+  double predicted_sigma_m_{100}, last_variance_m2_{100}, last_velocity_variance_{100}, clock_offset_s_{0};
+  GpsTime last_tag_{};
+  bool started_{false};
+  int suspect_epochs_{0};
+};
+
+}  // namespace searvins::estimator

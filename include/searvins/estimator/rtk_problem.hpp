@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// \file
+/// The smoother problem of GNSS-only RTK: which variables and factors there are under a robust formulation, and how many.
+#pragma once
+
+#include <searvins/estimator/rtk_options.hpp>
+#include <searvins/gnss/gnss_factors.hpp>
+#include <searvins/gnss/motion.hpp>
+#include <searvins/robust/formulation.hpp>
+#include <searvins/robust/loss.hpp>
+#include <searvins/smoother/fixed_lag_smoother.hpp>
+
+namespace searvins::estimator {
+
+/// A configuration: `Form` is one of robust::Batch, ScalarRows, LatentPivot, LatentPivotSymmetric. Code and phase go through DCS, Doppler through Huber
+/// [paper sec. Correlation-Preserving Robust Estimation].
+template <template <class> class Form, class CapacityType = HostedCapacity>
+struct RtkConfig {
+  using Capacity = CapacityType;
+  using CodePhaseForm = Form<robust::Dcs<double>>;
+  using DopplerForm = Form<robust::Huber<double>>;
+};
+
+template <class Config>
+struct RtkProblem {
+  using Cap = typename Config::Capacity;
+  using Scalar = double;
+  using CodeFactor = gnss::DifferenceFactor<gnss::Pva, typename Config::CodePhaseForm, gnss::Observable::code, Cap::candidates>;
+  using PhaseFactor = gnss::DifferenceFactor<gnss::Pva, typename Config::CodePhaseForm, gnss::Observable::phase, Cap::candidates>;
+  using DopplerFactor = gnss::DifferenceFactor<gnss::Pva, typename Config::DopplerForm, gnss::Observable::doppler, Cap::doppler_candidates>;
+
+  using Variables = smoother::Types<smoother::Capacity<gnss::Pva, Cap::states>, smoother::Capacity<gnss::Ambiguity, Cap::ambiguities>,
+                                    smoother::Capacity<gnss::PivotError, 2 * Cap::batches + Cap::states>>;
+  using Factors =
+      smoother::Types<smoother::Capacity<gnss::PvaPriorFactor, 1>, smoother::Capacity<gnss::WhiteJerkFactor, Cap::states>, smoother::Capacity<CodeFactor, Cap::batches>,
+                      smoother::Capacity<PhaseFactor, Cap::batches>, smoother::Capacity<DopplerFactor, Cap::states>,
+                      smoother::Capacity<gnss::AmbiguityDatum, Cap::ambiguities>, smoother::Capacity<gnss::AmbiguityWalk, Cap::ambiguities>,
+                      smoother::Capacity<gnss::IntegerFix, Cap::fixes>>;
+  static constexpr int max_front_dimension = Cap::max_front_dimension;
+  static constexpr int member_capacity = Cap::member_capacity;
+  static constexpr std::size_t arena_scalars = Cap::arena_scalars;
+};
+
+}  // namespace searvins::estimator

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// \file
+/// Do the phases of all satellites move as one antenna and one clock would make them? Who does not, has slipped.
+///
+/// With the change of the range at the predicted positions taken out, the change of phase i from epoch to epoch is
+///
+///     y_i = u_i' d + c + noise        u_i = d range_i / d p (unit, 3), d: error of the predicted displacement, c: change of the clocks
+///
+/// four unknowns for all satellites. On rover-base single differences this is a triple difference: of receivers, of satellites (through c),
+/// of epochs. It needs no second frequency and no Doppler, and sees slips that leave the geometry-free combination in place.
+///
+/// In a street many satellites are wrong at once (reflected, slipped) and some of them agree for a while, which drags least absolute values
+/// along. So [d; c] is found by consensus: sets of four satellites, spread evenly over all sets, are solved exactly, and the solution with
+/// the least truncated cost sum min(r^2 / threshold^2, 1) starts a least squares over whoever agrees.
+///
+/// The residual of a satellite is divided by 1 - leverage (its own vote), so that one which the rest cannot predict is not declared sound
+/// by itself.
+///
+/// For fewer satellites: the common change, c alone; i must agree with at least half of the signals of other satellites.
+#pragma once
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include <searvins/core/static_vector.hpp>
+#include <searvins/gnss/cycle_slip.hpp>
+#include <searvins/gnss/signal.hpp>
+
+namespace searvins::gnss {
+
+/// The change of one phase since the previous epoch.
+struct PhaseChange {
+  SatelliteId satellite{};
+  Eigen::Vector3d direction_e{Eigen::Vector3d::Zero()};  ///< d range / d p, unit, satellite to receiver
+  double change_m{0};                                    ///< predicted change of range taken out
+  double threshold_m{0};                                 ///< a larger residual is a slip
+  double wavelength_m{0};                                ///< a threshold above 0.45 of it cannot tell one cycle: then nothing passes
+};
+
+/// What the common-motion test found. `valid` false: no consensus, every result is `unavailable`.
+struct MotionFit {
+  bool valid{false};
+  Eigen::Vector3d displacement_e_m{Eigen::Vector3d::Zero()};  ///< to be added to the predicted displacement, ECEF
+  double clock_m{0};                                          ///< change of the clock difference
+  int satellites{0};                                          ///< that agree
+  double rms_m{0};                                            ///< of what agrees
+};
+
+namespace detail {
+
+/// [d; c], or the row [u' 1] of a change.
+using Row4 = Eigen::Matrix<double, 4, 1>;
+
+/// Inverse of a symmetric positive definite 4x4 by Cholesky: A = L L', A^-1 = L^-T L^-1. False when a pivot is below 1e-6 of the diagonal.
+[[nodiscard]] inline bool invert_spd4(const Eigen::Matrix4d& a, Eigen::Matrix4d& inverse) {
+  Eigen::Matrix4d l = Eigen::Matrix4d::Zero(), m = Eigen::Matrix4d::Zero();
+  for (int j = 0; j < 4; ++j) {
+    double d = a(j, j);
+    for (int k = 0; k < j; ++k) d -= l(j, k) * l(j, k);
+    if (!(d > 1e-6 * a(j, j))) return false;
+    l(j, j) = std::sqrt(d);
+    for (int i = j + 1; i < 4; ++i) {
+      double s = a(i, j);
+      for (int k = 0; k < j; ++k) s -= l(i, k) * l(j, k);
+      l(i, j) = s / l(j, j);
+    }
+  }
+  for (int j = 0; j < 4; ++j) {  // m = L^-1, column by column
+    m(j, j) = 1 / l(j, j);
+    for (int i = j + 1; i < 4; ++i) {
+      double s = 0;
+      for (int k = j; k < i; ++k) s -= l(i, k) * m(k, j);
+      m(i, j) = s / l(i, i);
+    }
+  }
+  inverse.noalias() = m.transpose() * m;
+  return true;
+}
+
+/// Normal equations that grow row by row.
+struct MotionEquations {
+  Eigen::Matrix4d normal{Eigen::Matrix4d::Zero()};
+  Row4 right{Row4::Zero()};
+
+  void add(const PhaseChange& c) {
+    const Row4 a{c.direction_e.x(), c.direction_e.y(), c.direction_e.z(), 1.0};
+    normal += a * a.transpose();
+    right += c.change_m * a;
+  }
+  [[nodiscard]] bool solve(Row4& x, Eigen::Matrix4d& normal_inverse) const {
+    if (!invert_spd4(normal, normal_inverse)) return false;
+    x = normal_inverse * right;
+    return true;
+  }
+};
+
+[[nodiscard]] inline double motion_residual_m(const PhaseChange& c, const Row4& x) {
+  return c.change_m - c.direction_e.dot(x.head<3>()) - x(3);
+}
+
+/// The four members of the set of rank `rank` among all sets of four of 0..n-1, in lexicographic order.
+[[nodiscard]] constexpr std::array<std::size_t, 4> set_of_four(std::size_t n, std::size_t rank) {
+  const auto choose = [](std::size_t m, std::size_t k) {
+    std::size_t c = 1;
+    for (std::size_t i = 1; i <= k; ++i) c = m + 1 > i ? c * (m + 1 - i) / i : 0;
+    return c;
+  };
+  std::array<std::size_t, 4> set{};
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    for (std::size_t with = choose(n - next - 1, 3 - k); rank >= with; with = choose(n - next - 1, 3 - k)) rank -= with, ++next;
+    set[k] = next++;
+  }
+  return set;
+}
+
+/// Verdict on a residual that is free of the signal's own vote.
+[[nodiscard]] inline CheckResult verdict(double residual_m, const PhaseChange& c) {
+  if (!(std::abs(residual_m) < c.threshold_m)) return CheckResult::failed;
+  return c.threshold_m <= 0.45 * c.wavelength_m ? CheckResult::passed : CheckResult::unavailable;
+}
+
+/// Best [d; c] among at most 128 sets of four satellites; `first[k]`: first change of satellite k. False when no set is solvable.
+template <std::size_t N>
+[[nodiscard]] bool motion_by_consensus(const StaticVector<PhaseChange, N>& changes, const StaticVector<std::uint16_t, N>& first,
+                                       Row4& best) {
+  constexpr std::size_t most_sets = 128;
+  const std::size_t n = first.size(), sets = n * (n - 1) * (n - 2) * (n - 3) / 24;
+  const std::size_t tries = std::min(sets, most_sets);
+  // Steps of the golden ratio spread the tried sets evenly over all; where all are tried the step is 1.
+  const std::size_t step = tries == sets ? 1 : static_cast<std::size_t>(0.6180339887 * static_cast<double>(sets));
+  double least = static_cast<double>(changes.size()) + 1;
+  for (std::size_t t = 0, rank = 0; t < tries; ++t, rank = (rank + step) % sets) {
+    MotionEquations four;
+    for (const std::size_t k : set_of_four(n, rank)) four.add(changes[first[k]]);
+    Row4 x;
+    Eigen::Matrix4d unused;
+    if (!four.solve(x, unused)) continue;
+    double cost = 0;
+    for (std::size_t i = 0; i < changes.size() && cost < least; ++i) {
+      const double z = motion_residual_m(changes[i], x) / changes[i].threshold_m;
+      cost += std::min(z * z, 1.0);
+    }
+    if (cost < least) least = cost, best = x;
+  }
+  return least <= static_cast<double>(changes.size());
+}
+
+}  // namespace detail
+
+/// The test of common motion. `changes` sorted by satellite; `results` gets one outcome each. At least five satellites, and at least 60 %
+/// of all, must agree, else nothing is said.
+template <std::size_t N>
+MotionFit common_motion_check(const StaticVector<PhaseChange, N>& changes, StaticVector<CheckResult, N>& results) {
+  constexpr std::size_t min_satellites = 5;
+  constexpr double least_redundancy = 0.2;  // 1 - leverage: below it the others do not predict the satellite
+  MotionFit fit;
+  results.clear();
+  results.resize(changes.size());
+  StaticVector<std::uint16_t, N> first;
+  for (std::size_t i = 0; i < changes.size(); ++i)
+    if (i == 0 || changes[i].satellite != changes[i - 1].satellite) first.push_back(static_cast<std::uint16_t>(i));
+  detail::Row4 x;
+  if (first.size() < min_satellites || !detail::motion_by_consensus(changes, first, x)) return fit;
+
+  StaticVector<std::uint8_t, N> votes;
+  votes.resize(changes.size());
+  Eigen::Matrix4d normal_inverse = Eigen::Matrix4d::Zero();
+  for (int iteration = 0; iteration < 8; ++iteration) {  // least squares over what agrees, until the set stays
+    detail::MotionEquations agreeing;
+    bool changed = iteration == 0;
+    for (std::size_t i = 0; i < changes.size(); ++i) {
+      const std::uint8_t vote = std::abs(detail::motion_residual_m(changes[i], x)) < changes[i].threshold_m ? 1 : 0;
+      changed = changed || vote != votes[i];
+      votes[i] = vote;
+      if (vote) agreeing.add(changes[i]);
+    }
+    if (!changed) break;
+    if (!agreeing.solve(x, normal_inverse)) return fit;
+  }
+  for (std::size_t k = 0; k < first.size(); ++k) {
+    const std::size_t end = k + 1 < first.size() ? first[k + 1] : changes.size();
+    bool any = false;
+    for (std::size_t i = first[k]; i < end; ++i) any = any || votes[i] != 0;
+    fit.satellites += any ? 1 : 0;
+  }
+  if (fit.satellites < static_cast<int>(min_satellites) || 10 * fit.satellites < 6 * static_cast<int>(first.size())) return fit;
+
+  double sum = 0, count = 0;
+  for (std::size_t k = 0; k < first.size(); ++k) {
+    const std::size_t begin = first[k], end = k + 1 < first.size() ? first[k + 1] : changes.size();
+    double voters = 0;
+    for (std::size_t i = begin; i < end; ++i) voters += votes[i];
+    const detail::Row4 a{changes[begin].direction_e.x(), changes[begin].direction_e.y(), changes[begin].direction_e.z(), 1.0};
+    const double redundancy = 1 - voters * a.dot(normal_inverse * a);
+    for (std::size_t i = begin; i < end; ++i) {
+      const double r = detail::motion_residual_m(changes[i], x);
+      if (votes[i]) sum += r * r, count += 1;
+      if (redundancy > least_redundancy) results[i] = detail::verdict(r / redundancy, changes[i]);
+    }
+  }
+  fit.valid = true;
+  fit.displacement_e_m = x.head<3>();
+  fit.clock_m = x(3);
+  fit.rms_m = std::sqrt(sum / count);
+  return fit;
+}
+
+/// The test of common change, for those that have no outcome yet (`unavailable`): a signal passes when it agrees, within the larger
+/// threshold of the two, with at least half of the signals of other satellites; with no other satellite nothing is said.
+template <std::size_t N>
+void common_change_check(const StaticVector<PhaseChange, N>& changes, StaticVector<CheckResult, N>& results) {
+  results.resize(changes.size());
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    if (results[i] != CheckResult::unavailable) continue;
+    int others = 0, agreeing = 0;
+    for (const PhaseChange& other : changes) {
+      if (other.satellite == changes[i].satellite) continue;
+      ++others;
+      if (std::abs(changes[i].change_m - other.change_m) < std::max(changes[i].threshold_m, other.threshold_m)) ++agreeing;
+    }
+    if (others > 0) results[i] = 2 * agreeing >= others ? detail::verdict(0, changes[i]) : CheckResult::failed;
+  }
+}
+
+/// Raises every threshold to three standard deviations of the changes about their median (1.4826 times the median deviation): a test
+/// against noise that nobody declared cannot fail everyone.
+template <std::size_t N>
+void raise_thresholds_to_spread(StaticVector<PhaseChange, N>& changes) {
+  StaticVector<double, N> values;
+  for (const PhaseChange& c : changes) values.push_back(c.change_m);
+  const auto median = [&]() {
+    const auto middle = values.begin() + values.size() / 2;
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  if (values.empty()) return;
+  const double centre_m = median();
+  for (double& v : values) v = std::abs(v - centre_m);
+  const double spread_m = 3 * 1.4826 * median();
+  for (PhaseChange& c : changes) c.threshold_m = std::max(c.threshold_m, spread_m);
+}
+
+}  // namespace searvins::gnss

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# Builds and runs consumer.cpp by one WAY of using the library (see CMakeLists.txt beside this file for the variables).
+cmake_minimum_required(VERSION 3.23)
+set(prefix "${WORK}/prefix")
+set(folder "${WORK}/${WAY}")
+
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output ECHO_OUTPUT_VARIABLE)
+  if(NOT status EQUAL 0)
+    list(JOIN ARGN " " command)
+    message(FATAL_ERROR "failed (${status}): ${command}\n${output}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+if(WAY STREQUAL "install")
+  file(REMOVE_RECURSE "${prefix}")
+  run("${CMAKE_COMMAND}" --install "${BUILD}" --prefix "${prefix}")
+  file(GLOB_RECURSE in_tree RELATIVE "${ROOT}/include" "${ROOT}/include/searvins/*.hpp")
+  file(GLOB_RECURSE installed RELATIVE "${prefix}/include" "${prefix}/include/*")
+  if(NOT in_tree STREQUAL installed)
+    message(FATAL_ERROR "installed headers are not those of the tree:\n  tree: ${in_tree}\n  installed: ${installed}")
+  endif()
+  return()
+endif()
+
+file(REMOVE_RECURSE "${folder}")
+file(MAKE_DIRECTORY "${folder}")
+if(WAY STREQUAL "pkg_config")
+  # PKG_CONFIG_PATH is searched before the system's folders, so a searvins.pc of the system cannot answer.
+  set(ENV{PKG_CONFIG_PATH} "${prefix}/share/pkgconfig")
+  run("${PKG_CONFIG}" --modversion searvins)
+  string(STRIP "${output}" found)
+  if(NOT found STREQUAL VERSION)
+    message(FATAL_ERROR "pkg-config names version ${found}, the project is ${VERSION}")
+  endif()
+  run("${PKG_CONFIG}" --cflags searvins)
+  separate_arguments(flags UNIX_COMMAND "${output}")
+  run("${CXX}" -std=c++20 ${flags} "${ROOT}/tests/consumers/consumer.cpp" -o "${folder}/consumer")
+else()
+  run("${CMAKE_COMMAND}" -S "${ROOT}/tests/consumers/${WAY}" -B "${folder}" -G "${GENERATOR}" "-DCMAKE_MAKE_PROGRAM=${MAKE_PROGRAM}"
+      "-DCMAKE_CXX_COMPILER=${CXX}" "-DCMAKE_PREFIX_PATH=${prefix}" "-DSEARVINS_ROOT=${ROOT}" "-DSEARVINS_EXPECTED_VERSION=${VERSION}"
+      "-DEigen3_DIR=${EIGEN_DIR}")
+  run("${CMAKE_COMMAND}" --build "${folder}")
+endif()
+
+run("${folder}/consumer")
+string(STRIP "${output}" printed)
+if(NOT printed STREQUAL VERSION)
+  message(FATAL_ERROR "the consumer was compiled against version '${printed}', the project is ${VERSION}")
+endif()
