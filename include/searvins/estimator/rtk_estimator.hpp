@@ -239,8 +239,36 @@ class RtkEstimator {
       add(gnss::PvaPriorFactor{*state, start, options_.start_sigma_m, options_.start_velocity_sigma_mps, options_.start_acceleration_sigma_mps2}, out);
     (void)nodes_.push_back({*state, out.time, SolutionStatus::dr});
     code_keys_.clear(), phase_keys_.clear(), differences_.clear();
+    code_variance_factor_ = code_scale2_;
+    code_information_share_ = 1 / correlation_factor(out);
     for (int g = 0; g < static_cast<int>(epoch_.groups.size()); ++g) add_group(g, *state, start_e_m, out);
     if (options_.use_doppler) add_doppler(*state, out);
+  }
+
+  /// n epochs within the correlation time of code errors are worth one, so each counts for 1/n. Instantaneous ambiguities do not add epochs up.
+  [[nodiscard]] double correlation_factor(const RtkSolution& out) const {
+    if (options_.continuity == ambiguity::ContinuityMode::instantaneous) return 1;
+    const double interval_s = nodes_.size() < 2 ? 1.0 : seconds_between(nodes_[nodes_.size() - 2].time, out.time);
+    return std::max(1.0, options_.code_correlation_s / std::max(0.05, interval_s));
+  }
+
+  /// Learns the receiver's code noise: the median of this epoch's whitened code residuals squared is 0.455 when the variances are right.
+  void learn_code_noise() {
+    if (!options_.adapt_code_noise) return;
+    StaticVector<double, gnss::kMaxCorrectedSignals> squares;
+    for (const auto& key : code_keys_) {
+      const double* e = smoother_.whitened_rows(key);
+      const auto* f = smoother_.find_factor(key);
+      for (int i = 0; e && i < f->size(); ++i) (void)squares.push_back(e[i] * e[i]);
+    }
+    if (squares.size() < 8) return;
+    const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+    std::nth_element(squares.begin(), middle, squares.end());
+    constexpr double median_of_chi_square_1 = 0.454936;
+    const double seen2 = code_scale2_ * *middle / median_of_chi_square_1;
+    const double low = options_.min_code_scale, high = options_.max_code_scale;
+    code_scale_count_ = std::min(code_scale_count_ + 1, std::max(1, options_.code_scale_memory));
+    code_scale2_ += (std::clamp(seen2, low * low, high * high) - code_scale2_) / (code_scale_count_ + 1);
   }
 
   template <class F>
@@ -341,11 +369,12 @@ class RtkEstimator {
     std::array<double, static_cast<std::size_t>(Cap::candidates)> variances{};
     for (std::uint16_t c : group.candidates)
       if (is_room(code)) {
-        variances[code.candidates.size()] = epoch_.signals[c].code_variance_m2;
+        variances[code.candidates.size()] = epoch_.signals[c].code_variance_m2 * code_variance_factor_;
         (void)code.candidates.push_back({epoch_.signals[c].satellite_e_m, epoch_.signals[c].code_m});
       }
+    code.information_share = code_information_share_;
     code.pivot.z = epoch_.signals[at(group.pivot)].code_m;
-    finish_batch(code, variances.data(), epoch_.signals[at(group.pivot)].code_variance_m2, code_phase_form_, out, code_keys_);
+    finish_batch(code, variances.data(), epoch_.signals[at(group.pivot)].code_variance_m2 * code_variance_factor_, code_phase_form_, out, code_keys_);
 
     const int pivot = phase_pivot(group);
     if (pivot < 0) return;
@@ -498,6 +527,8 @@ class RtkEstimator {
     write(out);
     if (options_.fix_memory == FixMemory::epoch) release_all();
     out.held_integers = static_cast<int>(held_.size());
+    out.code_scale = std::sqrt(code_scale2_);
+    learn_code_noise();
     watch_divergence(out);
   }
   static constexpr std::size_t kPhasesSize = static_cast<std::size_t>(kPhases);
@@ -671,7 +702,7 @@ class RtkEstimator {
     for (const auto& key : keys) {
       const double* w = smoother_.weights(key);
       const auto* f = smoother_.find_factor(key);
-      for (int i = 0; w && i < f->size(); ++i) sum += w[i], ++n;
+      for (int i = 0; w && i < f->size(); ++i) sum += w[i] / f->information_share, ++n;
     }
     return n > 0 ? sum / n : 0;
   }
@@ -720,6 +751,9 @@ class RtkEstimator {
   GpsTime last_tag_{};
   bool started_{false};
   int suspect_epochs_{0};
+  double code_scale2_{1}, code_variance_factor_{1};  ///< learned scale on code variances; the one in use
+  double code_information_share_{1};
+  int code_scale_count_{0};
 };
 
 }  // namespace searvins::estimator

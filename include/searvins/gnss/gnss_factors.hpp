@@ -63,6 +63,9 @@ struct DifferenceFactor {
   double wavelength_m{0};
   robust::SharedPivot<double, MaxCandidates> covariance{};
   FormulationType formulation{};
+  /// What the batch counts for, after its robust weights: below 1 when the errors of consecutive epochs are alike and would add up to too much. The
+  /// scale of what is an outlier stays that of one observation.
+  double information_share{1};
 
   [[nodiscard]] int size() const { return static_cast<int>(candidates.size()); }
   [[nodiscard]] int rows() const { return size() + FormulationType::extra_rows; }
@@ -138,7 +141,11 @@ struct DifferenceFactor {
       for (int i = 0; i <= m; ++i) J(i, columns) = de_dn[i];
   }
 
-  double weigh(const double* e, double* w) const { return formulation.weigh(e, rows(), w); }
+  double weigh(const double* e, double* w) const {
+    const double rho = formulation.weigh(e, rows(), w);
+    for (int i = 0; i < rows(); ++i) w[i] *= information_share;
+    return rho * information_share;
+  }
 
   /// A start for the latent pivot error at given values of the other variables.
   template <class Values>

@@ -73,9 +73,14 @@ class Elimination {
     for (int f = 0; f < n; ++f) old_shape[at(f)] = fronts_[at(f)].shape, was_clean[at(f)] = f < count_ && fronts_[at(f)].clean;
     const int old_count = count_;
     count_ = n;
+    tangent_size_ = 0;
+    if (n == 0) return true;
     assign_variables(window);
     assign_factors(window);
-    if (!collect_members(window, prior)) return false;
+    if (!collect_members(window, prior)) {
+      mark_dirty_from(0);  // the shapes are already those of the refused structure
+      return false;
+    }
     bool reusable = true;
     for (int f = 0; f < n; ++f) {
       Front& front = fronts_[at(f)];
@@ -105,6 +110,7 @@ class Elimination {
   /// pulls towards the present estimate. On failure nothing but the fronts themselves has changed.
   [[nodiscard]] EliminationFailure<Scalar> factorise(WindowType& window, Prior& prior, Scalar damping, math::ZeroPivot policy = math::ZeroPivot::fail, int only = -1) {
     (void)prior.template evaluate<Which::theta>(window);
+    damping_ = damping;
     const int last = only < 0 ? count_ : only + 1;
     for (int f = only < 0 ? 0 : only; f < last; ++f) {
       if (fronts_[at(f)].clean) continue;
@@ -395,8 +401,8 @@ class Elimination {
     if (f == prior_front_) add_prior(window, prior);
     for (int id = front.first_factor; id >= 0;) window.visit_factor(id, [&](auto& r) { add_factor(window, r), id = r.next; });
     for (int l = front.first_local; l >= 0; l = window.info(l).next) {
-      const int axis = add_local(window, l, damping);
-      if (axis >= 0 && policy == math::ZeroPivot::fail) return {Kind::zero_pivot, l, axis, 0};
+      const EliminationFailure<Scalar> failed = add_local(window, l, damping);
+      if (failed.kind == Kind::non_finite || (!failed.ok() && policy == math::ZeroPivot::fail)) return failed;
     }
     if (damping > 0) damp(window, front, damping);
     const auto report = math::partial_cholesky(work_.data(), ld_, n + 1, front.rows_e, reference_.data(), policy);
@@ -502,8 +508,8 @@ class Elimination {
     }
   }
 
-  /// Adds the factors of one local variable and subtracts its Schur product  B' H_ll^-1 B,  B = [H_lc g_l].  Returns a failing axis or -1.
-  int add_local(WindowType& window, int local, Scalar damping) {
+  /// Adds the factors of one local variable and subtracts its Schur product  B' H_ll^-1 B,  B = [H_lc g_l].  Damped like the chain variables.
+  [[nodiscard]] EliminationFailure<Scalar> add_local(WindowType& window, int local, Scalar damping) {
     const int dof = window.info(local).dof;
     block_ = LocalBlock{};
     touched_ = 0;
@@ -524,12 +530,23 @@ class Elimination {
           }
         }
       });
-    for (int i = 0; i < dof; ++i) block_.g[at(i)] = block_.H[at(i * kLocalDof + i)], block_.H[at(i * kLocalDof + i)] *= 1 + damping;
+    for (int i = 0; i < dof; ++i) block_.g[at(i)] = block_.H[at(i * kLocalDof + i)];
+    if (damping > 0) {
+      Scalar* const gradient = touch(ld_ - 1);
+      visit_local(window, local, [&]<class V>(VariableRecord<V>& r) {
+        for (int i = 0; i < V::dof; ++i) {
+          const Scalar extra = damping * block_.g[at(i)];
+          block_.H[at(i * kLocalDof + i)] += extra;
+          gradient[i] -= extra * r.delta[i];
+        }
+      });
+    }
     const auto report = math::partial_cholesky(block_.H.data(), kLocalDof, dof, dof, block_.g.data(), math::ZeroPivot::skip);
-    int failed = -1;
-    if (report.skipped > 0)
+    EliminationFailure<Scalar> failed;
+    if (!report.ok()) failed = {EliminationFailure<Scalar>::Kind::non_finite, local, report.failed, report.value};
+    if (report.ok() && report.skipped > 0)
       for (int i = dof - 1; i >= 0; --i)
-        if (!(block_.H[at(i * kLocalDof + i)] > 0)) failed = i;
+        if (!(block_.H[at(i * kLocalDof + i)] > 0)) failed = {EliminationFailure<Scalar>::Kind::zero_pivot, local, i, 0};
     for (int t = 0; t < touched_; ++t) math::solve_lower(block_.H.data(), kLocalDof, dof, local_row(touched_columns_[at(t)]));
     std::sort(touched_columns_.begin(), touched_columns_.begin() + touched_);
     for (int s = 0; s < touched_; ++s) {
@@ -607,7 +624,15 @@ class Elimination {
     });
   }
 
-  /// Local variable given the chain step:  H_ll d_l = -(g_l + H_lc d_c) = -sum J_l' W (e + J_c d_c).
+  /// fn(record) of a local variable; not instantiated for other roles, whose tangent spaces may be larger.
+  template <class Fn>
+  static void visit_local(WindowType& window, int local, Fn fn) {
+    window.visit_variable(local, [&]<class V>(VariableRecord<V>& r) {
+      if constexpr (V::role == Role::local) fn(r);
+    });
+  }
+
+  /// Local variable given the chain step:  H_ll d_l = -(g_l + H_lc d_c) = -sum J_l' W (e + J_c d_c), damped as the fronts are.
   void solve_local(WindowType& window, int local) {
     const int dof = window.info(local).dof;
     LocalBlock block;
@@ -639,10 +664,17 @@ class Elimination {
       });
     std::array<Scalar, static_cast<std::size_t>(kLocalDof)> reference{};
     for (int i = 0; i < dof; ++i) reference[at(i)] = block.H[at(i * kLocalDof + i)];
+    visit_local(window, local, [&]<class V>(VariableRecord<V>& r) {
+      for (int i = 0; i < V::dof; ++i) {
+        const Scalar extra = damping_ * reference[at(i)];
+        block.H[at(i * kLocalDof + i)] += extra;
+        block.g[at(i)] += extra * r.delta[i];
+      }
+    });
     (void)math::partial_cholesky(block.H.data(), kLocalDof, dof, dof, reference.data(), math::ZeroPivot::skip);
     math::solve_lower(block.H.data(), kLocalDof, dof, block.g.data());
     math::solve_lower_transposed(block.H.data(), kLocalDof, dof, block.g.data());
-    window.visit_variable(local, [&]<class V>(VariableRecord<V>& r) {
+    visit_local(window, local, [&]<class V>(VariableRecord<V>& r) {
       for (int i = 0; i < V::dof; ++i) r.candidate_delta[i] = block.g[at(i)];
       r.candidate = r.theta.retract(r.candidate_delta);
     });
@@ -656,6 +688,7 @@ class Elimination {
 
   std::array<Front, static_cast<std::size_t>(kMaxStates)> fronts_{};
   int count_{0}, tangent_size_{0}, prior_front_{-1}, ld_{1}, touched_{0};
+  Scalar damping_{0};  ///< of the last factorisation
   std::array<int, static_cast<std::size_t>(Problem::member_capacity)> members_{};
   std::array<int, static_cast<std::size_t>(WindowType::kFactors)> order_{};
   std::array<int, static_cast<std::size_t>(kMaxStates)> first_chain_{}, last_chain_{};

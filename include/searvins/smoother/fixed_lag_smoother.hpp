@@ -26,7 +26,9 @@
 /// Guarantees: an operation that fails leaves values, prior and structure as they were, bit for bit. Same calls, same bits.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <searvins/smoother/covariance.hpp>
 #include <searvins/smoother/elimination.hpp>
@@ -107,11 +109,13 @@ class FixedLagSmoother {
   void set_enabled(bool on) {
     if (window_.template enabled<F>() == on) return;
     window_.template set_enabled<F>(on);
-    if (window_.template factor_count<F>() > 0 && ensure_analysis()) {
-      window_.for_each_factor([&]<class G>(FactorRecord<G>& r, int) {
-        if constexpr (std::is_same_v<G, F>) elimination_.mark_dirty_from(r.front);
-      });
-    }
+    const bool analysed = ensure_analysis();  // where not, every front is dirty already
+    window_.for_each_factor([&]<class G>(FactorRecord<G>& r, int) {
+      if constexpr (std::is_same_v<G, F>) {
+        r.linearised = false;  // while off it does not follow its variables
+        if (analysed) elimination_.mark_dirty_from(r.front);
+      }
+    });
   }
 
   [[nodiscard]] const WindowType& window() const { return window_; }
@@ -143,7 +147,7 @@ class FixedLagSmoother {
         elimination_.solve(window_);
         const Scalar proposed = evaluate<Which::candidate>();
         step = largest_step();
-        if (std::isfinite(proposed) && proposed <= cost + Scalar(1e-9) * (Scalar(1) + std::abs(cost))) {
+        if (std::isfinite(proposed) && proposed <= cost + kCostRounding * (Scalar(1) + std::abs(cost))) {
           cost = proposed, accepted = true;
           break;
         }
@@ -195,7 +199,10 @@ class FixedLagSmoother {
       report.status = describe(failed, where);
       return report;
     }
-    if (report.status = form_prior(); !report.status.ok()) return report;
+    if (report.status = form_prior(); !report.status.ok()) {
+      elimination_.mark_dirty_from(0);  // front 0 was factored without the test for zero pivots
+      return report;
+    }
     remove_first_front(report);
     return report;
   }
@@ -214,8 +221,9 @@ class FixedLagSmoother {
   }
 
   /// Joint covariance (column-major, leading dimension ld) of any living variables, in the order of the keys, from the undamped factor at the present
-  /// linearisation. Returns its size. Errors: unknown_key, capacity_exceeded, under_determined, invalid_argument.
+  /// linearisation. Returns its size. Errors: no_data, unknown_key, capacity_exceeded, under_determined, invalid_argument.
   Result<int> joint_covariance(const AnyKey* keys, int count, Scalar* out, int ld) {
+    if (window_.states().empty()) return failure(StatusCode::no_data, "the window holds no state: add one first");
     if (!ensure_analysis()) return failure(StatusCode::capacity_exceeded, "Problem::member_capacity is too small for this window");
     int n = 0;
     if (count < 1 || count > static_cast<int>(ids_.size())) return failure(StatusCode::invalid_argument, "number of variables out of range", count);
@@ -244,6 +252,9 @@ class FixedLagSmoother {
   [[nodiscard]] Scalar cost() { return evaluate<Which::estimate>(); }
 
  private:
+  /// Share of the cost that its summation may round away: a step within it is no increase.
+  static constexpr Scalar kCostRounding = std::max(Scalar(1e-9), 16 * std::numeric_limits<Scalar>::epsilon());
+
   /// Rows and weights of every enabled factor at the values W; returns the total cost.
   template <Which W>
   Scalar evaluate() {
@@ -259,6 +270,12 @@ class FixedLagSmoother {
 
   /// Steps 1 and 2 of the file comment. Needs weights_now at the estimate.
   void relinearise(const Options& options) {
+    move_linearisation_points(options);
+    linearise_factors(options.weight_threshold);
+  }
+
+  /// theta <- x of the variables that moved more than the threshold.
+  void move_linearisation_points(const Options& options) {
     window_.for_each_variable([&]<class V>(VariableRecord<V>& r, int id) {
       VariableInfo& info = window_.info(id);
       if (info.prior >= 0 && options.prior == PriorLinearisation::first_estimate) return;
@@ -266,10 +283,15 @@ class FixedLagSmoother {
       for (int i = 0; i < V::dof; ++i)
         if (std::abs(r.delta[i]) > options.relinearise_threshold * scale[i]) info.relinearised = true;
       if (!info.relinearised) return;
-      r.theta = r.x;
+      r.theta = r.candidate = r.x;
       r.delta.setZero();
+      r.candidate_delta.setZero();  // a local variable without factors gets no step: its candidate stays here
       if (info.prior >= 0) elimination_.mark_dirty_from(prior_front());
     });
+  }
+
+  /// Rows and Jacobians of the factors whose variables' theta moved; weights that changed by more than the threshold.
+  void linearise_factors(Scalar weight_threshold) {
     const typename WindowType::template Values<Which::theta> values{window_};
     window_.for_each_factor([&]<class F>(FactorRecord<F>& r, int) {
       if (!window_.template enabled<F>()) return;
@@ -282,7 +304,7 @@ class FixedLagSmoother {
       }
       bool reweighted = moved;
       for (int i = 0; i < r.rows; ++i)
-        reweighted = reweighted || std::abs(r.weights_now[static_cast<std::size_t>(i)] - r.weights[static_cast<std::size_t>(i)]) > options.weight_threshold;
+        reweighted = reweighted || std::abs(r.weights_now[static_cast<std::size_t>(i)] - r.weights[static_cast<std::size_t>(i)]) > weight_threshold;
       if (!reweighted) return;
       r.weights = r.weights_now;
       elimination_.mark_dirty_from(r.front);
@@ -305,10 +327,10 @@ class FixedLagSmoother {
   /// A current, undamped factorisation of the present linearisation.
   Status ensure_factor() {
     bool pending = false;
-    window_.for_each_factor([&](auto& r, int) { pending = pending || !r.linearised; });
+    window_.for_each_factor([&]<class F>(FactorRecord<F>& r, int) { pending = pending || (window_.template enabled<F>() && !r.linearised); });
     if (pending) {
       (void)evaluate<Which::estimate>();
-      relinearise({});
+      linearise_factors(0);  // theta stays: whether a variable may move is for optimise() to say
     }
     if (damped_) elimination_.mark_dirty_from(0), damped_ = false;
     const auto failed = elimination_.factorise(window_, prior_, Scalar(0));
@@ -343,6 +365,7 @@ class FixedLagSmoother {
     });
     window_.for_each_factor([](auto& r, int) { r.linearised = false; });
     elimination_.mark_dirty_from(0);
+    (void)evaluate<Which::estimate>();  // rows and weights are those of the estimate again
     report.status = status;
     report.final_cost = report.initial_cost;
     return report;
@@ -406,7 +429,7 @@ class FixedLagSmoother {
       next.g[static_cast<std::size_t>(j)] = U[static_cast<std::ptrdiff_t>(j) * (m + 1) + m];
       next.reference[static_cast<std::size_t>(j)] = reference[j];
     }
-    next.c = U[static_cast<std::ptrdiff_t>(m) * (m + 1) + m] / 2;
+    next.c = 0;  // counted from the expansion point: the sum of all past costs would swamp the differences that step control compares
     if (join) {
       prior_.move_to_theta(window_);
       for (int a : prior_.variables)
@@ -420,14 +443,22 @@ class FixedLagSmoother {
               if (to >= to_b) next.h(to, to_b) += prior_.h(std::max(from, from_b), std::min(from, from_b));
             }
         }
-      next.c += prior_.c;
       elimination_.mark_dirty_from(0);
     }
+    bool finite = true;
+    for (std::size_t i = 0; i < n; ++i) finite = finite && std::isfinite(next.g[i]);
+    for (std::size_t i = 0; i < n * n; ++i) finite = finite && std::isfinite(next.H[i]);
+    if (!finite) return failure(StatusCode::non_finite, "the information left by the oldest state is not finite: a Jacobian or a weight of its factors is broken");
     return ok_status();
   }
 
   void remove_first_front(MarginaliseReport& report) {
     const auto front = elimination_.front(0);
+    for (int k = 0; k < front.eliminated; ++k) {
+      const VariableInfo& info = window_.info(elimination_.member(front.first + k));
+      if (info.degree == 0 && info.prior < 0) ++report.unconnected;
+    }
+    report.skipped_axes = zero_pivots(front);
     prior_.clear(window_);
     int gone = 0;
     window_.for_each_factor([&](auto& r, int id) {
@@ -444,7 +475,6 @@ class FixedLagSmoother {
     erase_idle_locals(window_.info(window_.states().front()).stamp, report);
     for (int k = 0; k < front.eliminated; ++k) {
       const int id = elimination_.member(front.first + k);
-      if (unconnected_before(front, id)) ++report.unconnected;
       window_.erase_variable(id);
       ++report.variables;
     }
@@ -477,13 +507,12 @@ class FixedLagSmoother {
     report.variables += idle;
   }
 
-  /// Whether nothing touched a variable of front 0: its pivots in the factor are zero.
-  [[nodiscard]] bool unconnected_before(const typename EliminationType::Front& front, int id) const {
+  /// Axes of front 0 whose pivot was passed over: nothing is known about them.
+  [[nodiscard]] int zero_pivots(const typename EliminationType::Front& front) const {
     const Scalar* const L = elimination_.factor_of(0);
-    const int first = window_.info(id).offset - front.offset;
-    for (int i = 0; i < window_.info(id).dof; ++i)
-      if (L[static_cast<std::ptrdiff_t>(first + i) * (front.border() + 1) + first + i] > 0) return false;
-    return true;
+    int zero = 0;
+    for (int i = 0; i < front.rows_e; ++i) zero += L[static_cast<std::ptrdiff_t>(i) * (front.border() + 1) + i] > 0 ? 0 : 1;
+    return zero;
   }
 
   WindowType window_{};

@@ -212,6 +212,7 @@ class Window {
   }
   [[nodiscard]] int id_of(const AnyKey& key) const {
     if (key.type < 0 || key.type >= VariableTypes::size) return -1;
+    if (key.slot >= static_cast<std::uint32_t>(kVariables)) return -1;
     const int id = VariableTypes::offset_of(key.type) + static_cast<int>(key.slot);
     if (id >= kVariables) return -1;
     const VariableInfo& info = info_[index(id)];

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// `searvins solve`: recordings in, trajectory and report out.
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "examples/searvins/commands.hpp"
+#include "examples/searvins/solve_job.hpp"
+#include "examples/support/option_parser.hpp"
+
+namespace searvins::examples {
+namespace {
+
+/// Options of later versions: known, so that the message can say so.
+struct LaterOption {
+  const char *name, *value_name;
+};
+constexpr LaterOption kLaterOptions[] = {{"imu", "FILE"}, {"tracks", "FILE"}, {"images", "DIR"}, {"positions", "FILE"}, {"dataset", "KIND"}};
+
+OptionParser solve_parser() {
+  OptionParser parser{"searvins solve", "positions of a GNSS antenna from recorded observations"};
+  parser.value("rover", "FILE", "RINEX observation file of the moving receiver").required();
+  parser.value("base", "FILE", "RINEX observation file of the base station; without it single points are computed");
+  parser.value("nav", "FILE", "RINEX navigation file").required().repeated();
+  parser.value("out", "DIR", "folder for the results, made when it is missing").required();
+  parser.value("rig", "FILE", "rig.json: signals, sigmas, base position");
+  parser.value("base-ecef", "X,Y,Z", "antenna of the base, ECEF metres; else the rig's, else that of the base file's header");
+  parser.value("robust", "FORM", "robust formulation").fallback(kDefaultFormulation).one_of({"batch", "scalar", "latent", "symmetric"});
+  parser.value("ambiguity", "MODE", "integer resolution").fallback("partial").one_of({"full", "partial", "float"});
+  parser.value("continuity", "MODE", "how ambiguities go on between epochs").fallback("hybrid").one_of({"hybrid", "constant", "instantaneous"});
+  parser.value("arc", "H", "epochs that share an ambiguity state (hybrid)").fallback("3");
+  parser.value("lag", "S", "length of the window, seconds").fallback("6");
+  parser.value("handover", "MODE", "ambiguities at a change of pivot").fallback("exact").one_of({"exact", "restart"});
+  parser.value("signals", "LIST", "rover signals to use, as G1C,G2W,E1C; else the rig's, else the best of every common carrier");
+  parser.value("sigma-profile", "NAME", "measurement sigmas where the rig names none").fallback(kDefaultSigmaProfile).one_of({"general", "urban", "geodetic"});
+  parser.value("mask", "DEG", "elevation mask; else the rig's, else 15");
+  parser.value("min-cn0", "DBHZ", "least C/N0; else the rig's, else 20");
+  parser.value("start", "SOW", "first second of week to solve");
+  parser.value("end", "SOW", "last second of week to solve");
+  parser.value("truth", "FILE", "reference trajectory: errors are computed and shown");
+  parser.value("truth-ecef", "X,Y,Z", "reference point of an antenna that does not move, ECEF metres");
+  parser.value("rate", "WHAT", "rows to write: gnss is all that this version has").fallback("gnss");
+  for (const LaterOption& later : kLaterOptions) parser.value(later.name, later.value_name, "not in this version, which solves GNSS only");
+  parser.epilogue(
+      "Written: trajectory.csv, trajectory_lagged.csv, solution.pos (RTKPLOT), trajectory.kml, trajectory_tum.txt (evo), summary.json, "
+      "report.html.\nExit codes: 0 done, 2 usage, 3 unusable input, 4 the run ended without a solution.");
+  return parser;
+}
+
+std::optional<Eigen::Vector3d> point(Options& options, const char* name) {
+  const std::vector<double> p = options.numbers(name, 3);
+  return p.empty() ? std::optional<Eigen::Vector3d>{} : Eigen::Vector3d{p[0], p[1], p[2]};
+}
+
+void take_signals(Options& options, SolveRequest& request) {
+  for (const std::string& text : options.list("signals")) {
+    gnss::SignalCode code;
+    if (gnss::signal_from_text(text.data(), text.size(), code))
+      request.signals.push_back(code);
+    else
+      options.fail("--signals: '" + text + "' is no signal (constellation G, E, C or J, band, tracking code, as in G2W)");
+  }
+}
+
+void refuse_later_options(Options& options) {
+  for (const LaterOption& later : kLaterOptions)
+    if (options.given(later.name)) options.fail(std::string{"--"} + later.name + ": this version solves GNSS only; leave the option out");
+  if (options.text("rate") != "gnss") options.fail("--rate " + options.text("rate") + ": this version solves GNSS only, at the rate of the rover");
+}
+
+SolveRequest request_of(Options& options) {
+  SolveRequest request;
+  request.rover = options.text("rover"), request.base = options.text("base"), request.nav = options.texts("nav");
+  request.rig = options.text("rig"), request.truth = options.text("truth");
+  request.truth_point_e_m = point(options, "truth-ecef"), request.base_position_e_m = point(options, "base-ecef");
+  request.start_sow = options.optional_number("start", 0, 604800), request.end_sow = options.optional_number("end", 0, 604800);
+  request.formulation = options.text("robust"), request.sigma_profile = options.text("sigma-profile");
+  request.mask_deg = options.optional_number("mask", 0, 89), request.min_cn0_dbhz = options.optional_number("min-cn0", 0, 60);
+  take_signals(options, request);
+  estimator::RtkOptions& o = request.options;
+  const std::string ambiguity = options.text("ambiguity"), continuity = options.text("continuity");
+  o.resolution.mode = ambiguity == "full" ? ambiguity::ResolutionMode::full : ambiguity == "float" ? ambiguity::ResolutionMode::off : ambiguity::ResolutionMode::partial;
+  o.continuity = continuity == "constant"        ? ambiguity::ContinuityMode::constant
+                 : continuity == "instantaneous" ? ambiguity::ContinuityMode::instantaneous
+                                                 : ambiguity::ContinuityMode::hybrid;
+  o.handover = options.text("handover") == "restart" ? estimator::PivotHandover::restart : estimator::PivotHandover::exact;
+  o.arc_epochs = static_cast<int>(options.integer("arc", 1, 1000));
+  o.lag_s = options.number("lag", 0, 600);
+  if (!request.truth.empty() && request.truth_point_e_m) options.fail("give either --truth FILE or --truth-ecef X,Y,Z");
+  if (request.base.empty() && request.base_position_e_m) options.fail("--base-ecef needs --base FILE");
+  return request;
+}
+
+int unusable(const io::Diagnostic& error) {
+  std::fprintf(stderr, "searvins solve: %s\n", io::to_string(error).c_str());
+  return kExitUnusableInput;
+}
+
+}  // namespace
+
+int run_solve(int argc, const char* const* argv) {
+  Options options = solve_parser().parse(argc, argv);
+  refuse_later_options(options);
+  SolveRequest request = request_of(options);
+  if (const auto code = options.finished()) return *code;
+  request.command = "searvins solve";
+  for (int i = 1; i < argc; ++i) (request.command += ' ') += argv[i];
+
+  const io::FileResult<SolveInputs> inputs = prepare(request);
+  if (!inputs) return unusable(inputs.error());
+  const io::FileResult<SolveOutcome> outcome = solve(request, *inputs);
+  if (!outcome) return unusable(outcome.error());
+  const std::string folder = options.text("out");
+  if (const std::string wrong = write_outputs(folder, request, *inputs, *outcome); !wrong.empty()) return unusable({folder, 0, wrong, "choose another folder with --out"});
+  std::fputs(summary_text(request, *inputs, *outcome).c_str(), stdout);
+  std::printf("\nresults in %s; open %s/report.html in a browser\n", folder.c_str(), folder.c_str());
+  if (outcome->solved_at_end) return kExitDone;
+  std::fprintf(stderr, "searvins solve: %s\n", outcome->rows.empty() ? "no epoch could be solved: the reasons stand above"
+                                                                     : "there is no solution at the end of the recording: the reasons stand above");
+  return kExitDegraded;
+}
+
+}  // namespace searvins::examples

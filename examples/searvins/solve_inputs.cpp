@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Reading and checking what a run needs, before anything is solved: every refusal names the file and what to do.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include <searvins/geodesy/wgs84.hpp>
+#include <searvins/gnss/weighting.hpp>
+#include <searvins/io/rinex_navigation.hpp>
+#include <searvins/io/rinex_observation.hpp>
+#include <searvins/io/text_fields.hpp>
+
+#include "examples/searvins/solve_job.hpp"
+
+namespace searvins::examples {
+namespace {
+
+constexpr double kRad = std::numbers::pi / 180;
+constexpr double kFarthestEphemerisS = 4 * 3600.0;  ///< the longest age that the library accepts
+
+std::string time_text(GpsTime t) {
+  const CivilTime c = civil_from_gps(t);
+  char buffer[96];
+  std::snprintf(buffer, sizeof buffer, "%04d-%02d-%02d %02d:%02d:%02.0f (week %lld, sow %.1f)", c.year, c.month, c.day, c.hour, c.minute,
+                std::floor(c.second), static_cast<long long>(t.week()), t.sow());
+  return buffer;
+}
+
+std::string signal_text(const gnss::SignalCode& s) { return {gnss::letter_of(s.constellation), s.band, s.attribute}; }
+
+/// Adds what a reader left out to the notes.
+void note_skipped(const std::string& file, const io::SkipLog& log, std::vector<std::string>& notes) {
+  for (const io::SkippedItem& item : log.items())
+    notes.push_back(std::filesystem::path{file}.filename().string() + ": " + item.reason + ", " + std::to_string(item.count) + " times, first at line " +
+                    std::to_string(item.first_line) + (item.hint.empty() ? "" : " (" + item.hint + ")"));
+}
+
+/// What an observation file holds, or why it cannot be used.
+io::FileResult<io::ObservationFileInfo> scan(const std::string& path, std::vector<std::string>& notes) {
+  io::RinexObservationReader reader;
+  if (!reader.open(path)) return *reader.error();
+  io::ObservationFileInfo info = io::scan_observations(reader);
+  if (!info.summary.first) return reader.error() ? *reader.error() : io::Diagnostic{path, 0, "holds no usable epoch", {}};
+  if (reader.error()) notes.push_back("reading ended early: " + io::to_string(*reader.error()));
+  note_skipped(path, info.summary.skipped, notes);
+  return info;
+}
+
+std::vector<gnss::SignalCode> signals_in(const io::ObservationFileInfo& info) {
+  std::vector<gnss::SignalCode> found;
+  for (const io::ConstellationCount& c : info.constellations)
+    for (const io::SignalCount& s : c.signals) found.push_back(s.signal);
+  return found;
+}
+
+std::string joined(const std::vector<gnss::SignalCode>& signals) {
+  std::string text;
+  for (const gnss::SignalCode& s : signals) (text += text.empty() ? "" : ",") += signal_text(s);
+  return text.empty() ? "none" : text;
+}
+
+using Failure = std::optional<io::Diagnostic>;
+
+Failure check_same_file(const SolveRequest& request) {
+  std::error_code ignored;
+  if (request.base.empty() || !std::filesystem::equivalent(request.rover, request.base, ignored)) return {};
+  return io::Diagnostic{request.base, 0, "is given as rover and as base", "give the file of the base station with --base, or leave --base out"};
+}
+
+/// The part of the recording that is asked for, and whether rover and base share any of it.
+Failure take_times(const SolveRequest& request, SolveInputs& in) {
+  const GpsTime first = *in.rover.summary.first, last = *in.rover.summary.last;
+  const auto place = [first](double sow) {  // in the week that is nearest to the recording's beginning
+    const double apart_s = sow - first.sow();
+    const int week = apart_s < -kSecondsPerWeek / 2 ? 1 : apart_s > kSecondsPerWeek / 2 ? -1 : 0;
+    return GpsTime::from_week_sow(first.week() + week, sow);
+  };
+  in.start = request.start_sow ? place(*request.start_sow).plus_seconds(-0.02) : first;
+  in.end = request.end_sow ? place(*request.end_sow).plus_seconds(0.02) : last;
+  if (in.start > last || in.end < first)
+    return io::Diagnostic{request.rover, 0, "has no epoch between --start and --end: it goes from " + time_text(first) + " to " + time_text(last),
+                          "--start and --end are GPS seconds of week"};
+  in.start = std::max(in.start, first), in.end = std::min(in.end, last);
+  if (!in.base) return {};
+  const GpsTime base_first = *in.base->summary.first, base_last = *in.base->summary.last;
+  const double max_age_s = in.options.differencing.base.max_age_s;
+  if (base_first > in.end.plus_seconds(0.02) || base_last.plus_seconds(max_age_s) < in.start)
+    return io::Diagnostic{request.base, 0,
+                          "does not overlap the rover in time: base from " + time_text(base_first) + " to " + time_text(base_last) + ", rover from " +
+                              time_text(in.start) + " to " + time_text(in.end),
+                          "get the base file of the rover's day and hour; tags must be GPS time in both"};
+  if (base_first > in.start.plus_seconds(1) || base_last.plus_seconds(max_age_s) < in.end)
+    in.notes.push_back("the base covers only a part of the rover's time: base from " + time_text(base_first) + " to " + time_text(base_last));
+  return {};
+}
+
+Failure take_signals(const SolveRequest& request, const std::optional<RigGnss>& rig, SolveInputs& in) {
+  const std::vector<gnss::SignalCode>& wanted = !request.signals.empty() ? request.signals : rig ? rig->signals : request.signals;
+  if (wanted.empty()) return {};
+  const std::string source = !request.signals.empty() ? "--signals" : request.rig;
+  if (wanted.size() > gnss::kMaxSignalGroups)
+    return io::Diagnostic{source, 0, "names more than " + std::to_string(gnss::kMaxSignalGroups) + " signals", "leave some out"};
+  const std::vector<gnss::SignalCode> rover = signals_in(in.rover);
+  const std::vector<gnss::SignalCode> base = in.base ? signals_in(*in.base) : rover;
+  std::vector<gnss::SignalCode> missing;
+  for (const gnss::SignalCode& s : wanted) {
+    const bool at_rover = std::any_of(rover.begin(), rover.end(), [&](const auto& r) { return r == s || (gnss::same_carrier(r, s) && r.attribute == ' '); });
+    const bool at_base = std::any_of(base.begin(), base.end(), [&](const auto& b) { return gnss::same_carrier(b, s); });
+    if (!at_rover || !at_base) missing.push_back(s);
+    (void)in.options.differencing.selection.wanted.push_back(s);
+  }
+  if (missing.size() == wanted.size())
+    return io::Diagnostic{source, 0,
+                          "none of the signals " + joined(wanted) + " is in both files; the rover has " + joined(rover) +
+                              (in.base ? ", the base " + joined(base) : std::string{}),
+                          "name signals of the rover whose carrier the base has too"};
+  if (!missing.empty()) in.notes.push_back("signals asked for that rover and base do not share: " + joined(missing));
+  return {};
+}
+
+/// Sigmas: the profile (the estimator's own unless another is named), then what the rig says.
+Failure take_sigmas(const SolveRequest& request, const std::optional<RigGnss>& rig, SolveInputs& in) {
+  gnss::SigmaModel& sigmas = in.options.differencing.sigmas;
+  if (request.sigma_profile == "urban") sigmas = gnss::urban_profile();
+  if (request.sigma_profile == "geodetic") sigmas = gnss::geodetic_profile();
+  if (!rig) return {};
+  for (const auto& [text, pair] : rig->code_sigma_m) {
+    gnss::SignalCode code;
+    gnss::SignalSigma* entry = gnss::signal_from_text(text.data(), text.size(), code) ? sigmas.entry(code) : nullptr;
+    if (!entry) return io::Diagnostic{request.rig, 0, "gnss.code_sigma_m names more signals than the " + std::to_string(gnss::SigmaModel::kMaxSignals) + " that fit", {}};
+    entry->code = {pair.x(), pair.y()};
+  }
+  const RigGnss usual;
+  if (rig->phase_sigma_m != usual.phase_sigma_m) {
+    const gnss::SigmaPair phase{rig->phase_sigma_m.x(), rig->phase_sigma_m.y()};
+    sigmas.other.phase = phase;
+    for (gnss::SignalSigma& s : sigmas.signals) s.phase = phase;
+  }
+  if (rig->doppler_sigma_mps != usual.doppler_sigma_mps) sigmas.doppler_mps = rig->doppler_sigma_mps;
+  return {};
+}
+
+void take_screening(const SolveRequest& request, const std::optional<RigGnss>& rig, SolveInputs& in) {
+  gnss::Screening& screening = in.options.differencing.screening;
+  if (rig) {
+    screening.elevation_mask_rad = rig->elevation_mask_deg * kRad;
+    screening.min_cn0_dbhz = rig->min_cn0_dbhz;
+    in.options.differencing.base.max_age_s = rig->max_base_age_s;
+  }
+  if (request.mask_deg) screening.elevation_mask_rad = *request.mask_deg * kRad;
+  if (request.min_cn0_dbhz) screening.min_cn0_dbhz = *request.min_cn0_dbhz;
+}
+
+/// --base-ecef, else the rig, else the header with the antenna's height above the marker.
+Failure take_base_position(const SolveRequest& request, const Rig& rig, SolveInputs& in) {
+  if (!in.base) return {};
+  const io::RinexObservationHeader& header = in.base->header;
+  std::string file = request.base;
+  if (request.base_position_e_m) {
+    in.base_position_e_m = *request.base_position_e_m, in.base_position_source = file = "--base-ecef";
+  } else if (rig.base_position_e_m) {
+    in.base_position_e_m = *rig.base_position_e_m, file = request.rig, in.base_position_source = "rig";
+  } else if (header.approx_position_e_m) {
+    const Eigen::Vector3d& hen = header.antenna_delta_hen_m;
+    const Eigen::Matrix3d R_ew = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(*header.approx_position_e_m));
+    in.base_position_e_m = *header.approx_position_e_m + R_ew * Eigen::Vector3d(hen.y(), hen.z(), hen.x());
+    in.base_position_source = "header of the base file";
+    in.notes.push_back("the base position is the one in the header of the base file: every error of it is an error of the trajectory");
+  } else {
+    return io::Diagnostic{request.base, 0, "the header gives no base position (APPROX POSITION XYZ is missing or zero)",
+                          "give the antenna of the base with --base-ecef X,Y,Z (metres), or as base.position_ecef_m in the rig"};
+  }
+  const double radius_m = in.base_position_e_m.norm();
+  if (!(radius_m > 6.25e6 && radius_m < 6.48e6))
+    return io::Diagnostic{file, 0, "the base position is not near the surface of the Earth (" + io::fixed_text(radius_m, 1) + " m from its centre)",
+                          "give ECEF metres with --base-ecef X,Y,Z"};
+  return {};
+}
+
+/// Ephemerides of all files, as far as they can serve the rover's time.
+Failure take_ephemerides(const SolveRequest& request, SolveInputs& in) {
+  std::optional<GpsTime> first, last;
+  for (const std::string& path : request.nav) {
+    io::Parsed<io::RinexNavigationFile> file = io::read_rinex_navigation(path);
+    if (file.error && file.value.ephemerides.empty()) return *file.error;
+    if (file.error) in.notes.push_back("reading ended early: " + io::to_string(*file.error));
+    note_skipped(path, file.skipped, in.notes);
+    if (file.value.ionosphere.present() && !in.ionosphere.present()) in.ionosphere = file.value.ionosphere;
+    for (const gnss::Ephemeris& e : file.value.ephemerides) {
+      first = first ? std::min(*first, e.toe) : e.toe, last = last ? std::max(*last, e.toe) : e.toe;
+      if (seconds_between(e.toe, in.start) <= kFarthestEphemerisS && seconds_between(in.end, e.toe) <= kFarthestEphemerisS) in.ephemerides.push_back(e);
+    }
+  }
+  if (in.ephemerides.empty() && !first)
+    return io::Diagnostic{request.nav.front(), 0, "holds no usable broadcast record", "give a navigation file with GPS, Galileo, BeiDou or QZSS records"};
+  if (in.ephemerides.empty())
+    return io::Diagnostic{request.nav.front(), 0,
+                          "no record is of the rover's time: records from " + time_text(*first) + " to " + time_text(*last) + ", rover from " +
+                              time_text(in.start) + " to " + time_text(in.end),
+                          "get the broadcast navigation file of the rover's day"};
+  return {};
+}
+
+Failure take_truth(const SolveRequest& request, SolveInputs& in) {
+  if (request.truth_point_e_m) in.truth = static_truth(*request.truth_point_e_m);
+  if (request.truth.empty()) return {};
+  io::FileResult<TruthTrack> truth = read_truth(request.truth, in.start);
+  if (!truth) return truth.error();
+  in.truth = std::move(truth).value();
+  return {};
+}
+
+}  // namespace
+
+void add_count(std::vector<Count>& counts, const std::string& what, long n) {
+  for (Count& c : counts)
+    if (c.first == what) return void(c.second += n);
+  counts.emplace_back(what, n);
+}
+
+io::FileResult<SolveInputs> prepare(const SolveRequest& request) {
+  SolveInputs in;
+  in.options = request.options;
+  Rig rig;
+  if (!request.rig.empty()) {
+    io::FileResult<Rig> read = read_rig(request.rig);
+    if (!read) return read.error();
+    rig = std::move(read).value();
+  }
+  if (const Failure f = check_same_file(request)) return *f;
+  io::FileResult<io::ObservationFileInfo> rover = scan(request.rover, in.notes);
+  if (!rover) return rover.error();
+  in.rover = std::move(rover).value();
+  if (!request.base.empty()) {
+    io::FileResult<io::ObservationFileInfo> base = scan(request.base, in.notes);
+    if (!base) return base.error();
+    in.base = std::move(base).value();
+  }
+  take_screening(request, rig.gnss, in);
+  if (const Failure f = take_times(request, in)) return *f;
+  if (const Failure f = take_base_position(request, rig, in)) return *f;
+  if (const Failure f = take_signals(request, rig.gnss, in)) return *f;
+  if (const Failure f = take_sigmas(request, rig.gnss, in)) return *f;
+  if (const Failure f = take_ephemerides(request, in)) return *f;
+  if (const Failure f = take_truth(request, in)) return *f;
+  return in;
+}
+
+}  // namespace searvins::examples

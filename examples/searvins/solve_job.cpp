@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Runs an estimator over a recording and keeps what trajectory, summary and report need.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include <searvins/geodesy/wgs84.hpp>
+#include <searvins/io/rinex_observation.hpp>
+#include <searvins/io/text_fields.hpp>
+
+#include "examples/searvins/solve_job.hpp"
+#include "examples/support/progress.hpp"
+
+namespace searvins::examples {
+namespace {
+
+constexpr double kDeg = 180 / std::numbers::pi;
+constexpr std::int64_t kBaseLeadNs = 20'000'000;  ///< base tags may lie this much after the rover's: both clocks are off by up to 10 ms
+constexpr double kSkyStepS = 5;                   ///< between two points of a satellite's path in the report
+constexpr double kEndS = 10;                      ///< a run whose last GNSS solution is older than this at the end has ended without one
+
+double milliseconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+io::SolutionStatus row_status(estimator::SolutionStatus s) { return static_cast<io::SolutionStatus>(s); }
+static_assert(static_cast<int>(io::SolutionStatus::spp) == static_cast<int>(estimator::SolutionStatus::spp) &&
+              static_cast<int>(io::SolutionStatus::dr) == static_cast<int>(estimator::SolutionStatus::dr));
+
+bool was_searched(ambiguity::ResolutionVerdict v) {
+  using enum ambiguity::ResolutionVerdict;
+  return v != off && v != too_few && v != ill_conditioned;
+}
+
+io::TrajectoryRow row_of(const estimator::RtkSolution& s, double solve_ms) {
+  io::TrajectoryRow row;
+  row.time = s.time;
+  row.p_e_m = s.position_e_m;
+  row.status = row_status(s.status);
+  row.set_covariance_enu_m2(s.covariance_enu_m2);
+  row.v_enu_mps = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(s.position_e_m)).transpose() * s.velocity_e_mps;
+  row.n_sat = s.satellites, row.n_dd = s.double_differences;
+  if (was_searched(s.verdict)) row.success_rate = s.success_rate;
+  row.solve_ms = solve_ms;
+  return row;
+}
+
+const char* name_of(gnss::CodeFate fate) {
+  constexpr const char* names[] = {"used", "no code", "low C/N0", "no ephemeris", "low elevation", "outlier"};
+  return names[static_cast<std::size_t>(fate)];
+}
+constexpr std::size_t kCodeFates = 6;
+
+/// Collects the diagnostics of the epochs.
+class Collector {
+ public:
+  Collector(SolveOutcome& out, bool with_base) : out_(out), with_base_(with_base) {
+    if (with_base) {
+      for (std::size_t r = 0; r < gnss::kRejections; ++r) out.rejection_reasons.emplace_back(gnss::name_of(static_cast<gnss::Rejection>(r)));
+      out.fix_outcomes.emplace_back("fixed");
+      for (int v = 1; v <= static_cast<int>(ambiguity::ResolutionVerdict::contradiction); ++v)
+        out.fix_outcomes.emplace_back(ambiguity::name_of(static_cast<ambiguity::ResolutionVerdict>(v)));
+    } else {
+      for (std::size_t f = 1; f < kCodeFates; ++f) out.rejection_reasons.emplace_back(name_of(static_cast<gnss::CodeFate>(f)));
+    }
+  }
+
+  void take(const gnss::ObservationEpoch& rover, const estimator::RtkSolution& s, const SolverRun& run, double solve_ms) {
+    out_.rows.push_back(row_of(s, solve_ms));
+    const gnss::DifferencedEpoch* differenced = run.differenced();
+    if (differenced && differenced->rover_tag != rover.tag) differenced = nullptr;
+    ReportEpoch& epoch = out_.epochs.emplace_back();
+    epoch.satellites_seen = static_cast<int>(rover.satellites.size()), epoch.satellites_used = s.satellites;
+    epoch.rejected.assign(out_.rejection_reasons.size(), 0);
+    epoch.base_age_s = s.base_age_s;
+    if (differenced)
+      take_differences(*differenced, s, epoch);
+    else
+      take_codes(run.single_point(), epoch);
+    out_.ratios.push_back(epoch.ratio), out_.ages_s.push_back(epoch.base_age_s);
+    out_.released_integers += s.released_integers;
+    out_.restarts += s.restarted && out_.rows.size() > 1;
+    if (!s.smoother_status.ok()) add_count(out_.incidents, std::string{"optimisation: "} + s.smoother_status.what);
+    if (differenced && !differenced->base_status.ok()) add_count(out_.incidents, std::string{"no differences: "} + differenced->base_status.what);
+    if (out_.rows.size() == 1 || seconds_between(last_sky_, s.tag) >= kSkyStepS) take_sky(run.single_point(), differenced, s.tag);
+  }
+
+  /// The oldest state of the window is written when it is about to be replaced: that is when it has seen the whole lag.
+  void take_lagged(const std::optional<LaggedEstimate>& oldest) {
+    if (pending_ && (!oldest || oldest->time != pending_->time)) {
+      io::TrajectoryRow row;
+      row.time = pending_->time, row.p_e_m = pending_->position_e_m, row.status = row_status(pending_->status);
+      if (out_.lagged_rows.empty() || out_.lagged_rows.back().time < row.time) out_.lagged_rows.push_back(row);
+    }
+    pending_ = oldest;
+  }
+
+  /// Satellite paths by name, and the empty reasons dropped.
+  void finish() {
+    for (auto& [name, satellite] : sky_) out_.satellites.push_back(std::move(satellite));
+    for (std::size_t r = out_.rejection_reasons.size(); r-- > 0;) {
+      if (std::any_of(out_.epochs.begin(), out_.epochs.end(), [r](const ReportEpoch& e) { return e.rejected[r] > 0; })) continue;
+      out_.rejection_reasons.erase(out_.rejection_reasons.begin() + static_cast<std::ptrdiff_t>(r));
+      for (ReportEpoch& e : out_.epochs) e.rejected.erase(e.rejected.begin() + static_cast<std::ptrdiff_t>(r));
+    }
+  }
+
+ private:
+  void take_differences(const gnss::DifferencedEpoch& d, const estimator::RtkSolution& s, ReportEpoch& epoch) const {
+    for (std::size_t r = 0; r < gnss::kRejections; ++r) epoch.rejected[r] = d.rejected[r];
+    double sum = 0;
+    int n = 0;
+    for (const gnss::CorrectedSignal& c : d.signals)
+      if (std::isfinite(c.cn0_dbhz)) sum += c.cn0_dbhz, ++n;
+    if (n > 0) epoch.mean_cn0_dbhz = sum / n;
+    if (s.double_differences > 0) epoch.weight_code = s.code_weight, epoch.weight_phase = s.phases > 0 ? s.phase_weight : io::kUnknown;
+    epoch.fix_outcome = static_cast<int>(s.verdict);
+    if (was_searched(s.verdict) && s.ratio > 0) epoch.ratio = s.ratio;
+  }
+
+  void take_codes(const gnss::SinglePointSolution& s, ReportEpoch& epoch) const {
+    double sum = 0;
+    int n = 0;
+    for (const gnss::CodeRow& row : s.rows) {
+      if (row.fate == gnss::CodeFate::used && std::isfinite(row.cn0_dbhz)) sum += row.cn0_dbhz, ++n;
+      if (row.fate != gnss::CodeFate::used && !with_base_) ++epoch.rejected[static_cast<std::size_t>(row.fate) - 1];
+    }
+    if (n > 0) epoch.mean_cn0_dbhz = sum / n;
+  }
+
+  /// A point of every satellite whose direction is known.
+  void take_sky(const gnss::SinglePointSolution& s, const gnss::DifferencedEpoch* d, GpsTime tag) {
+    last_sky_ = tag;
+    for (const gnss::CodeRow& row : s.rows) {
+      if (row.elevation_rad <= 0) continue;
+      double rejected = row.fate == gnss::CodeFate::used ? 0 : 1, used = 1 - rejected;
+      if (d) {
+        const auto is_of = [&row](const auto& x) { return x.satellite == row.satellite; };
+        rejected = static_cast<double>(std::count_if(d->rejections.begin(), d->rejections.end(), is_of));
+        used = static_cast<double>(std::count_if(d->signals.begin(), d->signals.end(), is_of));
+      }
+      char name[8];
+      std::snprintf(name, sizeof name, "%c%02d", gnss::letter_of(row.satellite.constellation), static_cast<int>(row.satellite.number));
+      ReportSatellite& satellite = sky_[name];
+      satellite.name = name;
+      const double share = rejected + used > 0 ? std::min(1.0, rejected / (rejected + used)) : 1;
+      satellite.points.push_back({row.azimuth_rad * kDeg, row.elevation_rad * kDeg, row.cn0_dbhz, share});
+    }
+  }
+
+  SolveOutcome& out_;
+  bool with_base_;
+  std::map<std::string, ReportSatellite> sky_;
+  GpsTime last_sky_{};
+  std::optional<LaggedEstimate> pending_;
+};
+
+/// Hands the base epochs over up to a rover tag.
+class BaseFeed {
+ public:
+  io::FileResult<bool> open(const std::string& path) {
+    if (path.empty()) return true;
+    if (!reader_.open(path)) return *reader_.error();
+    more_ = reader_.next(epoch_);
+    return true;
+  }
+  void feed(GpsTime rover_tag, SolverRun& run, SolveOutcome& out) {
+    while (more_ && epoch_.tag.ns <= rover_tag.ns + kBaseLeadNs) {
+      const Status s = run.add_base(epoch_);
+      if (!s.ok()) add_count(out.incidents, std::string{"base epoch: "} + s.what);
+      more_ = reader_.next(epoch_);
+    }
+  }
+
+ private:
+  io::RinexObservationReader reader_;
+  gnss::ObservationEpoch epoch_;
+  bool more_{false};
+};
+
+/// Scores the run over the part of the recording that was solved.
+void score(const SolveRequest& request, const SolveInputs& in, SolveOutcome& out) {
+  if (!in.truth || out.rows.empty()) return;
+  EvaluationOptions rules;
+  rules.step_s = std::max(1.0, std::round(in.rover.interval_s));
+  const GpsTime reference = in.truth->is_static ? out.rows.front().time : in.truth->points.front().time;
+  const GpsTime week_start = GpsTime::from_week_sow(reference.week(), 0);
+  rules.start_sow = seconds_between(week_start, in.start) - (in.truth->is_static ? 0 : 0.02);
+  rules.end_sow = seconds_between(week_start, in.end) + (in.truth->is_static ? 0 : 0.02);
+  io::FileResult<Evaluation> evaluation = evaluate(*in.truth, out.rows, rules);
+  if (evaluation)
+    out.evaluation = std::move(evaluation).value();
+  else
+    add_count(out.incidents, (request.truth.empty() ? "--truth-ecef" : request.truth) + ": " + evaluation.error().message);
+}
+
+}  // namespace
+
+io::FileResult<SolveOutcome> solve(const SolveRequest& request, const SolveInputs& in) {
+  SolveOutcome out;
+  const std::unique_ptr<SolverRun> run =
+      in.base ? make_run(request.formulation, in.options) : make_single_point_run(in.options);
+  if (!run) return io::Diagnostic{"--robust", 0, "'" + request.formulation + "' is no formulation", "use batch, scalar, latent or symmetric"};
+  for (const gnss::Ephemeris& e : in.ephemerides)
+    if (!run->add_ephemeris(e).ok()) add_count(out.incidents, "ephemeris left out: the store is full");
+  if (in.ionosphere.present()) run->set_ionosphere(in.ionosphere);
+  if (in.base)
+    if (const Status s = run->set_base_position(in.base_position_e_m); !s.ok()) return io::Diagnostic{request.base, 0, s.what, "give --base-ecef X,Y,Z"};
+
+  io::RinexObservationReader rover;
+  BaseFeed base;
+  if (!rover.open(request.rover)) return *rover.error();
+  if (const io::FileResult<bool> opened = base.open(request.base); !opened) return opened.error();
+  Collector collector{out, in.base.has_value()};
+  Progress progress{request.label, static_cast<std::size_t>(std::max(0.0, seconds_between(in.start, in.end) * 10)) + 1};
+  const auto start = std::chrono::steady_clock::now();
+  gnss::ObservationEpoch epoch;
+  long fixed = 0;
+  while (rover.next(epoch) && epoch.tag <= in.end) {
+    if (epoch.tag < in.start) continue;
+    base.feed(epoch.tag, *run, out);
+    ++out.rover_epochs;
+    const auto before = std::chrono::steady_clock::now();
+    const Result<estimator::RtkSolution> solution = run->update(epoch);
+    const double solve_ms = milliseconds_since(before);
+    if (!solution.ok()) {
+      add_count(out.skipped, solution.status().what);
+    } else if (!solution->position_e_m.allFinite() || (!out.rows.empty() && solution->time <= out.rows.back().time)) {
+      add_count(out.skipped, solution->position_e_m.allFinite() ? "time of the state does not rise" : "position is not finite");
+    } else {
+      collector.take(epoch, *solution, *run, solve_ms);
+      fixed += solution->status == estimator::SolutionStatus::fix;
+      if (solution->status != estimator::SolutionStatus::dr) out.solved_at_end = seconds_between(epoch.tag, in.end) <= std::max(kEndS, 3 * in.rover.interval_s);
+    }
+    collector.take_lagged(run->oldest());
+    progress.update(static_cast<std::size_t>(seconds_between(in.start, epoch.tag) * 10) + 1,
+                    std::to_string(out.rover_epochs) + " epochs, " + std::to_string(fixed) + " fixed");
+  }
+  collector.take_lagged(std::nullopt);
+  collector.finish();
+  progress.finish();
+  out.wall_s = milliseconds_since(start) / 1000;
+  score(request, in, out);
+  return out;
+}
+
+}  // namespace searvins::examples

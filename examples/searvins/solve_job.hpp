@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// \file
+/// One run of `searvins solve`: what was asked for, what the files hold, what came out. `demo` uses the same.
+#pragma once
+
+#include <Eigen/Core>
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <searvins/estimator/rtk_options.hpp>
+#include <searvins/gnss/ephemeris.hpp>
+#include <searvins/io/file_result.hpp>
+#include <searvins/io/rinex_info.hpp>
+#include <searvins/io/trajectory.hpp>
+
+#include "examples/searvins/solver_run.hpp"
+#include "examples/support/evaluation.hpp"
+#include "examples/support/rig.hpp"
+#include "examples/support/run_report.hpp"
+#include "examples/support/truth.hpp"
+
+namespace searvins::examples {
+
+/// The sigmas that `--sigma-profile` falls back to: the estimator's own.
+inline constexpr const char* kDefaultSigmaProfile = "general";
+
+/// What was asked for.
+struct SolveRequest {
+  std::string rover, base;  ///< RINEX observation files; no base: single points
+  std::vector<std::string> nav;
+  std::string rig, truth;
+  std::optional<Eigen::Vector3d> truth_point_e_m, base_position_e_m;
+  std::optional<double> start_sow, end_sow;
+  std::string formulation{kDefaultFormulation};
+  std::string sigma_profile{kDefaultSigmaProfile};
+  std::vector<gnss::SignalCode> signals;  ///< empty: the rig's, else the best of every common carrier
+  std::optional<double> mask_deg, min_cn0_dbhz;
+  estimator::RtkOptions options{};  ///< what neither rig nor profile sets
+  std::string command{};            ///< the command line, for the report
+  std::string label{"solve"};       ///< of the progress line
+};
+
+/// The files, read and checked against each other.
+struct SolveInputs {
+  io::ObservationFileInfo rover;
+  std::optional<io::ObservationFileInfo> base;
+  std::vector<gnss::Ephemeris> ephemerides;  ///< those of the rover's time
+  gnss::KlobucharCoefficients ionosphere{};
+  GpsTime start{}, end{};  ///< rover tags to solve, inclusive
+  Eigen::Vector3d base_position_e_m{Eigen::Vector3d::Zero()};
+  std::string base_position_source{};
+  std::optional<TruthTrack> truth;
+  estimator::RtkOptions options{};
+  std::vector<std::string> notes;  ///< what a user should know
+};
+
+/// Something that happened so many times.
+using Count = std::pair<std::string, long>;
+/// Adds `n` to the count of a text.
+void add_count(std::vector<Count>& counts, const std::string& what, long n = 1);
+
+/// What came out.
+struct SolveOutcome {
+  std::vector<io::TrajectoryRow> rows, lagged_rows;
+  std::vector<ReportEpoch> epochs;  ///< as many as rows
+  std::vector<ReportSatellite> satellites;
+  std::vector<std::string> rejection_reasons, fix_outcomes;
+  std::vector<double> ratios, ages_s;  ///< as many as rows
+  long rover_epochs{0};                ///< offered, between start and end
+  std::vector<Count> skipped;          ///< rover epochs without a solution, by reason
+  std::vector<Count> incidents;        ///< epochs with a solution that something happened to
+  long restarts{0}, released_integers{0};
+  bool solved_at_end{false};  ///< there is a solution that rests on GNSS at the end of the recording
+  std::optional<Evaluation> evaluation;
+  double wall_s{0};
+};
+
+/// Reads and checks everything but the observations themselves.
+[[nodiscard]] io::FileResult<SolveInputs> prepare(const SolveRequest& request);
+/// Runs the estimator over the recording.
+[[nodiscard]] io::FileResult<SolveOutcome> solve(const SolveRequest& request, const SolveInputs& inputs);
+
+/// The table for the terminal.
+[[nodiscard]] std::string summary_text(const SolveRequest& request, const SolveInputs& inputs, const SolveOutcome& outcome);
+/// Writes all output files into a folder, which is made; an empty string on success, else what went wrong.
+[[nodiscard]] std::string write_outputs(const std::string& folder, const SolveRequest& request, const SolveInputs& inputs,
+                                        const SolveOutcome& outcome);
+
+}  // namespace searvins::examples

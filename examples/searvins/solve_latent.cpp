@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The estimator with latent pivot errors under a Gaussian prior.
+#include <memory>
+
+#include "examples/searvins/rtk_run.hpp"
+
+namespace searvins::examples {
+
+std::unique_ptr<SolverRun> make_latent_run(const estimator::RtkOptions& options) { return std::make_unique<RtkRun<robust::LatentPivot>>(options); }
+
+}  // namespace searvins::examples

@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a run leaves behind: the table in the terminal and the files in the folder.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include <searvins/geodesy/local_frame.hpp>
+#include <searvins/io/rtklib_solution.hpp>
+#include <searvins/io/text_fields.hpp>
+#include <searvins/io/trajectory_export.hpp>
+#include <searvins/version.hpp>
+
+#include "examples/searvins/solve_job.hpp"
+#include "examples/support/evaluation_tables.hpp"
+#include "examples/support/json_writer.hpp"
+#include "examples/support/report.hpp"
+#include "examples/support/table.hpp"
+
+namespace searvins::examples {
+namespace {
+
+constexpr double kDeg = 180 / std::numbers::pi;
+
+std::string percent(std::size_t part, long whole) {
+  return whole > 0 ? io::fixed_text(100.0 * static_cast<double>(part) / static_cast<double>(whole), 2) + " %" : "-";
+}
+
+std::vector<double> finite(const std::vector<double>& values) {
+  std::vector<double> out;
+  std::copy_if(values.begin(), values.end(), std::back_inserter(out), [](double v) { return std::isfinite(v); });
+  return out;
+}
+
+std::vector<double> solve_times(const SolveOutcome& outcome) {
+  std::vector<double> ms;
+  for (const io::TrajectoryRow& row : outcome.rows) ms.push_back(row.solve_ms);
+  return finite(ms);
+}
+
+std::string three(const std::vector<double>& values, int decimals, const char* unit) {
+  if (values.empty()) return "-";
+  return cell(percentile(values, 0.5), decimals) + " / " + cell(percentile(values, 0.95), decimals) + " / " + cell(percentile(values, 1), decimals) + ' ' + unit;
+}
+
+std::string position_text(const Eigen::Vector3d& p) {
+  return io::fixed_text(p.x(), 4) + ", " + io::fixed_text(p.y(), 4) + ", " + io::fixed_text(p.z(), 4);
+}
+
+/// Rejected signals over the run, by reason, most frequent first.
+std::vector<Count> rejections(const SolveOutcome& outcome) {
+  std::vector<Count> counts;
+  for (std::size_t r = 0; r < outcome.rejection_reasons.size(); ++r)
+    for (const ReportEpoch& e : outcome.epochs)
+      if (e.rejected[r] > 0) add_count(counts, outcome.rejection_reasons[r], e.rejected[r]);
+  std::stable_sort(counts.begin(), counts.end(), [](const Count& a, const Count& b) { return a.second > b.second; });
+  return counts;
+}
+
+/// Outcomes of the integer resolution over the run, "fixed" first.
+std::vector<Count> outcomes(const SolveOutcome& outcome) {
+  std::vector<Count> counts;
+  for (std::size_t v = 0; v < outcome.fix_outcomes.size(); ++v) {
+    const auto n = std::count_if(outcome.epochs.begin(), outcome.epochs.end(), [v](const ReportEpoch& e) { return e.fix_outcome == static_cast<int>(v); });
+    if (n > 0) counts.emplace_back(outcome.fix_outcomes[v], n);
+  }
+  return counts;
+}
+
+/// Distance from the base at the first solution, kilometres.
+double baseline_km(const SolveInputs& in, const SolveOutcome& outcome) {
+  return in.base && !outcome.rows.empty() ? (outcome.rows.front().p_e_m - in.base_position_e_m).norm() / 1000 : io::kUnknown;
+}
+
+std::size_t status_count(const SolveOutcome& outcome, io::SolutionStatus status) {
+  return static_cast<std::size_t>(std::count_if(outcome.rows.begin(), outcome.rows.end(), [status](const io::TrajectoryRow& r) { return r.status == status; }));
+}
+
+std::string formulation_text(const SolveRequest& request, const SolveInputs& in) { return in.base ? request.formulation : "single point (no base)"; }
+
+std::string mode_text(const SolveRequest& request) {
+  switch (request.options.resolution.mode) {
+    case ambiguity::ResolutionMode::full: return "full";
+    case ambiguity::ResolutionMode::partial: return "partial";
+    case ambiguity::ResolutionMode::off: return "float";
+  }
+  return {};
+}
+
+std::string continuity_text(const SolveRequest& request) {
+  switch (request.options.continuity) {
+    case ambiguity::ContinuityMode::constant: return "constant";
+    case ambiguity::ContinuityMode::instantaneous: return "instantaneous";
+    case ambiguity::ContinuityMode::hybrid: return "hybrid, " + std::to_string(request.options.arc_epochs) + " epochs";
+  }
+  return {};
+}
+
+/// The lines of the summary; the report shows those that it does not compute itself.
+std::vector<ReportEntry> run_figures(const SolveInputs& in, const SolveOutcome& outcome) {
+  std::vector<ReportEntry> lines;
+  long skipped = 0;
+  for (const Count& c : outcome.skipped) skipped += c.second;
+  lines.emplace_back("rover epochs", std::to_string(outcome.rover_epochs));
+  lines.emplace_back("with a solution", percent(outcome.rows.size(), outcome.rover_epochs));
+  if (skipped) lines.emplace_back("skipped", std::to_string(skipped));
+  if (in.base) {
+    lines.emplace_back("baseline", cell(baseline_km(in, outcome), 2) + " km");
+    lines.emplace_back("base age, median / 95 % / max", three(finite(outcome.ages_s), 2, "s"));
+    lines.emplace_back("window restarts", std::to_string(outcome.restarts));
+    lines.emplace_back("integers taken back", std::to_string(outcome.released_integers));
+  }
+  lines.emplace_back("update, median / 95 % / max", three(solve_times(outcome), 2, "ms"));
+  lines.emplace_back("whole run", io::fixed_text(outcome.wall_s, 2) + " s");
+  return lines;
+}
+
+std::vector<ReportEntry> settings(const SolveRequest& request, const SolveInputs& in) {
+  std::vector<ReportEntry> s;
+  const auto name = [](const std::string& path) { return std::filesystem::path{path}.filename().string(); };
+  s.emplace_back("rover", name(request.rover));
+  if (in.base) s.emplace_back("base", name(request.base)), s.emplace_back("base position, ECEF m", position_text(in.base_position_e_m)), s.emplace_back("base position from", in.base_position_source);
+  for (const std::string& nav : request.nav) s.emplace_back("navigation", name(nav));
+  s.emplace_back("robust formulation", formulation_text(request, in));
+  if (in.base) {
+    s.emplace_back("ambiguities", mode_text(request));
+    s.emplace_back("continuity", continuity_text(request));
+    s.emplace_back("pivot handover", request.options.handover == estimator::PivotHandover::exact ? "exact" : "restart");
+    s.emplace_back("window", io::fixed_text(request.options.lag_s, 1) + " s");
+    s.emplace_back("least success rate", io::fixed_text(in.options.resolution.min_success_rate, 2));
+    s.emplace_back("least ratio", io::fixed_text(in.options.resolution.min_ratio, 2));
+    s.emplace_back("sigma profile", request.sigma_profile);
+    s.emplace_back("elevation mask", io::fixed_text(in.options.differencing.screening.elevation_mask_rad * kDeg, 1) + " deg");
+    s.emplace_back("least C/N0", io::fixed_text(in.options.differencing.screening.min_cn0_dbhz, 1) + " dB-Hz");
+  }
+  std::string wanted;
+  for (const gnss::SignalCode& c : in.options.differencing.selection.wanted)
+    (wanted += wanted.empty() ? "" : " ") += {gnss::letter_of(c.constellation), c.band, c.attribute};
+  if (in.base) s.emplace_back("signals", wanted.empty() ? "best of every common carrier" : wanted);
+  return s;
+}
+
+/// Notes on what was skipped or happened.
+std::vector<std::string> notes(const SolveInputs& in, const SolveOutcome& outcome) {
+  std::vector<std::string> lines;
+  for (const Count& c : outcome.skipped) lines.push_back(std::to_string(c.second) + " rover epochs without a solution: " + c.first);
+  for (const Count& c : outcome.incidents) lines.push_back(std::to_string(c.second) + " times " + c.first);
+  lines.insert(lines.end(), in.notes.begin(), in.notes.end());
+  return lines;
+}
+
+std::string title_of(const SolveRequest& request) {
+  const std::filesystem::path rover{request.rover};
+  const std::string folder = std::filesystem::absolute(rover).parent_path().filename().string();
+  return folder.empty() ? rover.filename().string() : folder;
+}
+
+std::string subtitle_of(const SolveRequest& request, const SolveInputs& in, const SolveOutcome& outcome) {
+  const CivilTime c = civil_from_gps(in.start);
+  char date[48];
+  std::snprintf(date, sizeof date, "%04d-%02d-%02d %02d:%02d:%02.0f GPS time", c.year, c.month, c.day, c.hour, c.minute, std::floor(c.second));
+  std::string text = std::string{date} + ", " + std::to_string(outcome.rover_epochs) + " rover epochs";
+  if (in.rover.interval_s > 0) text += " at " + io::fixed_text(1 / in.rover.interval_s, in.rover.interval_s > 1 ? 3 : 0) + " Hz";
+  if (in.base) text += ", base " + cell(baseline_km(in, outcome), 2) + " km away, " + request.formulation + " formulation, " + mode_text(request) + " ambiguity resolution";
+  return text;
+}
+
+RunReport report_of(const SolveRequest& request, const SolveInputs& in, const SolveOutcome& outcome) {
+  RunReport report;
+  report.title = title_of(request), report.subtitle = subtitle_of(request, in, outcome), report.command = request.command;
+  report.rows = outcome.rows, report.epochs = outcome.epochs;
+  report.rejection_reasons = outcome.rejection_reasons, report.fix_outcomes = outcome.fix_outcomes;
+  if (in.base && request.options.resolution.mode != ambiguity::ResolutionMode::off) report.success_rate_gate = in.options.resolution.min_success_rate;
+  report.satellites = outcome.satellites, report.truth = in.truth, report.evaluation = outcome.evaluation;
+  report.figures = run_figures(in, outcome), report.settings = settings(request, in), report.notes = notes(in, outcome);
+  return report;
+}
+
+void member_counts(JsonWriter& json, const char* key, const std::vector<Count>& counts) {
+  json.begin_object(key);
+  for (const Count& c : counts) json.member(c.first, c.second);
+  json.end_object();
+}
+
+void member_errors(JsonWriter& json, const char* key, const ErrorFigures& f) {
+  json.begin_object(key).member("rmse", f.rmse_m).member("p50", f.p50_m).member("p95", f.p95_m).member("max", f.max_m).end_object();
+}
+
+void member_distribution(JsonWriter& json, const char* key, const std::vector<double>& v) {
+  json.begin_object(key).member("median", percentile(v, 0.5)).member("p95", percentile(v, 0.95)).member("max", percentile(v, 1)).end_object();
+}
+
+std::string summary_json(const SolveRequest& request, const SolveInputs& in, const SolveOutcome& outcome) {
+  JsonWriter json;
+  json.begin_object().member("schema", 1).member("program", std::string{"searvins "} + kVersionString).member("command", request.command);
+  json.begin_object("settings");
+  for (const auto& [label, value] : settings(request, in)) json.member(label == "navigation" ? "navigation" : label, value);
+  json.end_object();
+  json.member("rover_epochs", outcome.rover_epochs).member("solutions", outcome.rows.size()).member("solution_at_end", outcome.solved_at_end);
+  json.begin_object("status");
+  for (std::size_t s = 0; s < io::kSolutionStatuses; ++s) {
+    const auto status = static_cast<io::SolutionStatus>(s);
+    json.member(io::name_of(status), status_count(outcome, status));
+  }
+  json.end_object();
+  if (const auto& e = outcome.evaluation) {
+    json.begin_object("errors_m").member("epochs", e->epochs.size()).member("availability_pct", e->availability_pct);
+    json.member("below_1p0_pct", e->below_1p0_pct).member("below_1p5_pct", e->below_1p5_pct);
+    member_errors(json, "horizontal", e->horizontal), member_errors(json, "spatial", e->spatial), member_errors(json, "vertical", e->vertical);
+    json.member("fixed", e->fixed).member("correct_fixes", e->fixed - e->wrong_fixes).member("wrong_fixes", e->wrong_fixes);
+    json.member("fix_rate_pct", e->fix_rate_pct);
+    member_errors(json, "fixed_horizontal", e->fixed_horizontal);
+    json.member("mean_nees", e->mean_nees).end_object();
+  }
+  member_counts(json, "skipped_epochs", outcome.skipped), member_counts(json, "incidents", outcome.incidents);
+  member_counts(json, "rejected_signals", rejections(outcome)), member_counts(json, "integer_resolution", outcomes(outcome));
+  member_distribution(json, "base_age_s", finite(outcome.ages_s)), member_distribution(json, "solve_ms", solve_times(outcome));
+  json.member("restarts", outcome.restarts).member("released_integers", outcome.released_integers).member("wall_s", outcome.wall_s);
+  json.begin_array("notes");
+  for (const std::string& note : in.notes) json.value(note);
+  return json.end_array().end_object().text();
+}
+
+void append_counts(std::string& text, const char* title, const std::vector<Count>& counts) {
+  if (counts.empty()) return;
+  Table table{{title, "count"}};
+  for (const Count& c : counts) table.row({c.first, std::to_string(c.second)});
+  text += '\n' + table.text();
+}
+
+}  // namespace
+
+std::string summary_text(const SolveRequest& request, const SolveInputs& in, const SolveOutcome& outcome) {
+  Table table{{"figure", "value"}};
+  table.row({"formulation", formulation_text(request, in)});
+  if (in.base) table.row({"base position from", in.base_position_source});
+  for (const auto& [label, value] : run_figures(in, outcome)) table.row({label, value});
+  for (std::size_t s = 0; s < io::kSolutionStatuses; ++s) {
+    const auto status = static_cast<io::SolutionStatus>(s);
+    if (const std::size_t n = status_count(outcome, status)) table.row({io::name_of(status), std::to_string(n) + "  " + percent(n, outcome.rover_epochs)});
+  }
+  if (const auto& e = outcome.evaluation) {
+    const auto errors = [](const ErrorFigures& f, int d) { return cell(f.rmse_m, d) + " / " + cell(f.p95_m, d) + " / " + cell(f.max_m, d) + " m"; };
+    table.row({"scored epochs", std::to_string(e->epochs.size())});
+    table.row({"H RMSE / P95 / max", errors(e->horizontal, 3)});
+    table.row({"3-D RMSE / P95 / max", errors(e->spatial, 3)});
+    table.row({"H below 1.0 m / 1.5 m", cell(e->below_1p0_pct, 2) + " / " + cell(e->below_1p5_pct, 2) + " %"});
+    table.row({"fixed H RMSE / P95 / max", errors(e->fixed_horizontal, 4)});
+    table.row({"correct fixes / wrong (>= 0.5 m)", std::to_string(e->fixed - e->wrong_fixes) + " / " + std::to_string(e->wrong_fixes)});
+  }
+  std::string text = table.text();
+  append_counts(text, "signals not used, signal epochs", rejections(outcome));
+  append_counts(text, "integer resolution, epochs", outcomes(outcome));
+  const std::vector<std::string> lines = notes(in, outcome);
+  if (!lines.empty()) text += "\nnotes\n";
+  for (const std::string& line : lines) text += "  " + line + '\n';
+  return text;
+}
+
+std::string write_outputs(const std::string& folder, const SolveRequest& request, const SolveInputs& in, const SolveOutcome& outcome) {
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed) return "the folder cannot be made: " + failed.message();
+  const auto write = [&folder](const char* name, const std::string& text) { return io::write_text_file((std::filesystem::path{folder} / name).string(), text); };
+  io::RtklibHeader header;
+  header.program = std::string{"searvins "} + kVersionString;
+  header.input_files.push_back(request.rover);
+  if (in.base) header.input_files.push_back(request.base), header.reference = position_text(in.base_position_e_m);
+  header.input_files.insert(header.input_files.end(), request.nav.begin(), request.nav.end());
+  const Eigen::Vector3d origin_e_m = outcome.rows.empty() ? Eigen::Vector3d{6378137, 0, 0} : outcome.rows.front().p_e_m;
+  const std::pair<const char*, std::string> files[] = {
+      {"trajectory.csv", io::trajectory_csv(outcome.rows)},
+      {"trajectory_lagged.csv", io::trajectory_csv(outcome.lagged_rows)},
+      {"solution.pos", io::rtklib_solution(outcome.rows, header, outcome.ratios, outcome.ages_s)},
+      {"trajectory.kml", io::trajectory_kml(outcome.rows)},
+      {"trajectory_tum.txt", io::trajectory_tum(outcome.rows, origin_e_m)},
+      {"summary.json", summary_json(request, in, outcome)},
+      {"report.html", report_html(report_of(request, in, outcome))}};
+  for (const auto& [name, text] : files)
+    if (std::string wrong = write(name, text); !wrong.empty()) return wrong;
+  return {};
+}
+
+}  // namespace searvins::examples

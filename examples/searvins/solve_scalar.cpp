@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The estimator with one robust weight a row of the whitened batch.
+#include <memory>
+
+#include "examples/searvins/rtk_run.hpp"
+
+namespace searvins::examples {
+
+std::unique_ptr<SolverRun> make_scalar_run(const estimator::RtkOptions& options) { return std::make_unique<RtkRun<robust::ScalarRows>>(options); }
+
+}  // namespace searvins::examples
