@@ -59,10 +59,10 @@ const Flip kFlips[] = {
     {"walk_sigma_cycles", [](RtkOptions& o) { o.walk_sigma_cycles = 0.01; }},
     {"datum_sigma_cycles", [](RtkOptions& o) { o.datum_sigma_cycles = 30; }},
     {"handover", [](RtkOptions& o) { o.handover = estimator::PivotHandover::restart; }},
-    {"resolution.mode", [](RtkOptions& o) { o.resolution.mode = ambiguity::ResolutionMode::full; }},
+    {"resolution.mode", [](RtkOptions& o) { o.resolution.mode = ambiguity::ResolutionMode::off; }},
     {"resolution.min_success_rate", [](RtkOptions& o) { o.resolution.min_success_rate = 0.9999999; }},
     {"resolution.min_ratio", [](RtkOptions& o) { o.resolution.min_ratio = 20; }},
-    {"resolution.norm_confidence", [](RtkOptions& o) { o.resolution.norm_confidence = 0.3; }},
+    {"resolution.norm_confidence", [](RtkOptions& o) { o.resolution.norm_confidence = 1e-6; }},
     {"resolution.min_ambiguities", [](RtkOptions& o) { o.resolution.min_ambiguities = 24; }},
     {"resolution.max_sigma_horizontal_m", [](RtkOptions& o) { o.resolution.max_sigma_horizontal_m = 0.002; }},
     {"resolution.max_sigma_vertical_m", [](RtkOptions& o) { o.resolution.max_sigma_vertical_m = 0.004; }},
@@ -70,7 +70,7 @@ const Flip kFlips[] = {
     {"fix_sigma_cycles", [](RtkOptions& o) { o.fix_sigma_cycles = 0.05; }},
     {"fix_memory", [](RtkOptions& o) { o.fix_memory = estimator::FixMemory::epoch; }},
     {"release_sigmas", [](RtkOptions& o) { o.release_sigmas = 0.5; }},
-    {"max_suspect_share", [](RtkOptions& o) { o.max_suspect_share = 0.0; }},
+    {"max_suspect_share", [](RtkOptions& o) { o.max_suspect_share = -1; }},
     {"use_phase", [](RtkOptions& o) { o.use_phase = false; }},
     {"use_doppler", [](RtkOptions& o) { o.use_doppler = false; }},
     {"lag_s", [](RtkOptions& o) { o.lag_s = 10; }},
@@ -83,7 +83,6 @@ const Flip kFlips[] = {
     {"solver.max_iterations", [](RtkOptions& o) { o.solver.max_iterations = 2; }},
     {"solver.step_tolerance", [](RtkOptions& o) { o.solver.step_tolerance = 1e-6; }},
     {"solver.relinearise_threshold", [](RtkOptions& o) { o.solver.relinearise_threshold = 0.1; }},
-    {"solver.weight_threshold", [](RtkOptions& o) { o.solver.weight_threshold = 0.05; }},
     {"solver.prior", [](RtkOptions& o) { o.solver.prior = smoother::PriorLinearisation::first_estimate; }},
     {"differencing.selection.wanted", [](RtkOptions& o) { (void)o.differencing.selection.wanted.push_back(signal("G1C")); }},
     {"differencing.screening.elevation_mask_rad", [](RtkOptions& o) { o.differencing.screening.elevation_mask_rad = 0.6; }},
@@ -127,6 +126,10 @@ TEST_CASE("P12 every settings field changes some output") {
     const bool changed = outputs(d, options) != reference;
     CHECK(changed);
   }
+  RtkOptions lazy, lazier;  // weights are kept only where the linearisation is
+  lazy.solver.relinearise_threshold = lazier.solver.relinearise_threshold = 100;
+  lazier.solver.weight_threshold = 0.9;
+  CHECK(outputs(d, lazy) != outputs(d, lazier));
 }
 
 TEST_CASE("1000 updates without one heap allocation") {
@@ -135,7 +138,7 @@ TEST_CASE("1000 updates without one heap allocation") {
   RtkUnderTest rtk = estimator_for(d);
   const auto before = heap_allocations();
   std::size_t answered = 0;
-  for (std::size_t k = 0; k < d.rover.size(); ++k) answered += feed(rtk, d, k).ok() ? 1 : 0;
+  for (std::size_t k = 0; k < d.rover.size(); ++k) answered += feed(rtk, d, k).ok() ? std::size_t{1} : std::size_t{0};
   const auto allocations = heap_allocations() - before;
   CHECK(allocations == 0);
   CHECK(answered == d.rover.size());

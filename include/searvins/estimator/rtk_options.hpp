@@ -26,11 +26,11 @@ enum class FixMemory : std::uint8_t {
   epoch    ///< only the epoch that accepted it
 };
 
-/// Sigmas of a rover-base single difference that the estimator starts from: codes of a good receiver (the estimator scales them by what it sees),
+/// Sigmas of a rover-base single difference that the estimator starts from: codes of a good receiver in the open,
 /// phases with some room for antennas and a few kilometres of atmosphere, Doppler 0.2 m/s.
 [[nodiscard]] inline gnss::SigmaModel default_sigmas() {
   gnss::SigmaModel m;
-  m.other = {{}, {0.3, 0.3}, {0.003, 0.006}};
+  m.other = {{}, {0.5, 0.5}, {0.003, 0.006}};
   m.doppler_mps = 0.2;
   return m;
 }
@@ -50,7 +50,7 @@ struct RtkOptions {
   double release_sigmas{4};             ///< a held integer further than this from the float without it is released
   double max_suspect_share{0.2};        ///< a fix after which more than this share of its phases is down-weighted below 1/2 is taken back
   double code_correlation_s{8};         ///< codes of one receiver err alike over this time: their variances grow by it over the epoch interval
-  bool adapt_code_noise{true};          ///< scale the code variances by what the residuals of this receiver have shown so far
+  bool adapt_code_noise{false};         ///< scale the code variances by what the residuals of this receiver have shown so far
   double min_code_scale{0.5}, max_code_scale{4};  ///< bounds of that scale on sigma
   int code_scale_memory{30};            ///< epochs over which it is averaged
   bool use_phase{true};
