@@ -61,22 +61,29 @@ int run_demo(int argc, const char* const* argv) {
     request.formulation = formulation, request.label = formulation;
     const std::string folder = (out / formulation).string();
     request.command = "searvins solve --rover " + request.rover + " --base " + request.base + " --nav " + request.nav.front() +
-                      (request.rig.empty() ? "" : " --rig " + request.rig) + " --truth " + request.truth + " --robust " + formulation + " --out " + folder;
+                      (request.rig.empty() ? "" : " --rig " + request.rig) + " --truth " + request.truth + " --robust " + formulation +
+                      " --out " + folder;
     const io::FileResult<SolveOutcome> outcome = solve(request, *inputs);
     if (!outcome) return unusable(outcome.error());
-    if (const std::string wrong = write_outputs(folder, request, *inputs, *outcome); !wrong.empty()) return unusable({folder, 0, wrong, "choose another folder with --out"});
+    if (const std::string wrong = write_outputs(folder, request, *inputs, *outcome); !wrong.empty())
+      return unusable({folder, 0, wrong, "choose another folder with --out"});
     all_solved = all_solved && outcome->solved_at_end;
     if (!outcome->evaluation) continue;
-    if (best.empty() || is_better(*outcome->evaluation, runs.front().evaluation)) best = formulation, runs.insert(runs.begin(), {formulation, *outcome->evaluation});
-    else runs.push_back({formulation, *outcome->evaluation});
+    if (best.empty() || is_better(*outcome->evaluation, runs.front().evaluation))
+      best = formulation, runs.insert(runs.begin(), {formulation, *outcome->evaluation});
+    else
+      runs.push_back({formulation, *outcome->evaluation});
   }
-  if (runs.empty()) return unusable({request.truth, 0, "no epoch of the recording can be scored against it", "check that both are of the same day"});
+  if (runs.empty())
+    return unusable({request.truth, 0, "no epoch of the recording can be scored against it", "check that both are of the same day"});
   std::fputs(evaluation_text(runs).c_str(), stdout);
 
   std::error_code failed;
   fs::copy_file(out / best / "report.html", out / "report.html", fs::copy_options::overwrite_existing, failed);
-  if (failed) return unusable({(out / "report.html").string(), 0, "could not be written: " + failed.message(), "choose another folder with --out"});
-  std::printf("\nThe recording is synthetic and GNSS only. Report of the best run (%s): %s\n", best.c_str(), (out / "report.html").string().c_str());
+  if (failed)
+    return unusable({(out / "report.html").string(), 0, "could not be written: " + failed.message(), "choose another folder with --out"});
+  std::printf("\nThe recording is synthetic and GNSS only. Report of the best run (%s): %s\n", best.c_str(),
+              (out / "report.html").string().c_str());
   return all_solved ? kExitDone : kExitDegraded;
 }
 

@@ -15,7 +15,8 @@ namespace {
 struct LaterOption {
   const char *name, *value_name;
 };
-constexpr LaterOption kLaterOptions[] = {{"imu", "FILE"}, {"tracks", "FILE"}, {"images", "DIR"}, {"positions", "FILE"}, {"dataset", "KIND"}};
+constexpr LaterOption kLaterOptions[] = {
+    {"imu", "FILE"}, {"tracks", "FILE"}, {"images", "DIR"}, {"positions", "FILE"}, {"dataset", "KIND"}};
 
 OptionParser solve_parser() {
   OptionParser parser{"searvins solve", "positions of a GNSS antenna from recorded observations"};
@@ -27,12 +28,16 @@ OptionParser solve_parser() {
   parser.value("base-ecef", "X,Y,Z", "antenna of the base, ECEF metres; else the rig's, else that of the base file's header");
   parser.value("robust", "FORM", "robust formulation").fallback(kDefaultFormulation).one_of({"batch", "scalar", "latent", "symmetric"});
   parser.value("ambiguity", "MODE", "integer resolution").fallback("partial").one_of({"full", "partial", "float"});
-  parser.value("continuity", "MODE", "how ambiguities go on between epochs").fallback("hybrid").one_of({"hybrid", "constant", "instantaneous"});
+  parser.value("continuity", "MODE", "how ambiguities go on between epochs")
+      .fallback("hybrid")
+      .one_of({"hybrid", "constant", "instantaneous"});
   parser.value("arc", "H", "epochs that share an ambiguity state (hybrid)").fallback("3");
   parser.value("lag", "S", "length of the window, seconds").fallback("6");
   parser.value("handover", "MODE", "ambiguities at a change of pivot").fallback("exact").one_of({"exact", "restart"});
   parser.value("signals", "LIST", "rover signals to use, as G1C,G2W,E1C; else the rig's, else the best of every common carrier");
-  parser.value("sigma-profile", "NAME", "measurement sigmas where the rig names none").fallback(kDefaultSigmaProfile).one_of({"general", "urban", "geodetic"});
+  parser.value("sigma-profile", "NAME", "measurement sigmas where the rig names none")
+      .fallback(kDefaultSigmaProfile)
+      .one_of({"general", "urban", "geodetic"});
   parser.value("mask", "DEG", "elevation mask; else the rig's, else 15");
   parser.value("min-cn0", "DBHZ", "least C/N0; else the rig's, else 20");
   parser.value("start", "SOW", "first second of week to solve");
@@ -65,7 +70,8 @@ void take_signals(Options& options, SolveRequest& request) {
 void refuse_later_options(Options& options) {
   for (const LaterOption& later : kLaterOptions)
     if (options.given(later.name)) options.fail(std::string{"--"} + later.name + ": this version solves GNSS only; leave the option out");
-  if (options.text("rate") != "gnss") options.fail("--rate " + options.text("rate") + ": this version solves GNSS only, at the rate of the rover");
+  if (options.text("rate") != "gnss")
+    options.fail("--rate " + options.text("rate") + ": this version solves GNSS only, at the rate of the rover");
 }
 
 SolveRequest request_of(Options& options) {
@@ -79,7 +85,9 @@ SolveRequest request_of(Options& options) {
   take_signals(options, request);
   estimator::RtkOptions& o = request.options;
   const std::string ambiguity = options.text("ambiguity"), continuity = options.text("continuity");
-  o.resolution.mode = ambiguity == "full" ? ambiguity::ResolutionMode::full : ambiguity == "float" ? ambiguity::ResolutionMode::off : ambiguity::ResolutionMode::partial;
+  o.resolution.mode = ambiguity == "full"    ? ambiguity::ResolutionMode::full
+                      : ambiguity == "float" ? ambiguity::ResolutionMode::off
+                                             : ambiguity::ResolutionMode::partial;
   o.continuity = continuity == "constant"        ? ambiguity::ContinuityMode::constant
                  : continuity == "instantaneous" ? ambiguity::ContinuityMode::instantaneous
                                                  : ambiguity::ContinuityMode::hybrid;
@@ -111,12 +119,14 @@ int run_solve(int argc, const char* const* argv) {
   const io::FileResult<SolveOutcome> outcome = solve(request, *inputs);
   if (!outcome) return unusable(outcome.error());
   const std::string folder = options.text("out");
-  if (const std::string wrong = write_outputs(folder, request, *inputs, *outcome); !wrong.empty()) return unusable({folder, 0, wrong, "choose another folder with --out"});
+  if (const std::string wrong = write_outputs(folder, request, *inputs, *outcome); !wrong.empty())
+    return unusable({folder, 0, wrong, "choose another folder with --out"});
   std::fputs(summary_text(request, *inputs, *outcome).c_str(), stdout);
   std::printf("\nresults in %s; open %s/report.html in a browser\n", folder.c_str(), folder.c_str());
   if (outcome->solved_at_end) return kExitDone;
-  std::fprintf(stderr, "searvins solve: %s\n", outcome->rows.empty() ? "no epoch could be solved: the reasons stand above"
-                                                                     : "there is no solution at the end of the recording: the reasons stand above");
+  std::fprintf(stderr, "searvins solve: %s\n",
+               outcome->rows.empty() ? "no epoch could be solved: the reasons stand above"
+                                     : "there is no solution at the end of the recording: the reasons stand above");
   return kExitDegraded;
 }
 

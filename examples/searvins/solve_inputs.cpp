@@ -35,8 +35,8 @@ std::string signal_text(const gnss::SignalCode& s) { return {gnss::letter_of(s.c
 /// Adds what a reader left out to the notes.
 void note_skipped(const std::string& file, const io::SkipLog& log, std::vector<std::string>& notes) {
   for (const io::SkippedItem& item : log.items())
-    notes.push_back(std::filesystem::path{file}.filename().string() + ": " + item.reason + ", " + std::to_string(item.count) + " times, first at line " +
-                    std::to_string(item.first_line) + (item.hint.empty() ? "" : " (" + item.hint + ")"));
+    notes.push_back(std::filesystem::path{file}.filename().string() + ": " + item.reason + ", " + std::to_string(item.count) +
+                    " times, first at line " + std::to_string(item.first_line) + (item.hint.empty() ? "" : " (" + item.hint + ")"));
 }
 
 /// What an observation file holds, or why it cannot be used.
@@ -68,7 +68,8 @@ using Failure = std::optional<io::Diagnostic>;
 Failure check_same_file(const SolveRequest& request) {
   std::error_code ignored;
   if (request.base.empty() || !std::filesystem::equivalent(request.rover, request.base, ignored)) return {};
-  return io::Diagnostic{request.base, 0, "is given as rover and as base", "give the file of the base station with --base, or leave --base out"};
+  return io::Diagnostic{request.base, 0, "is given as rover and as base",
+                        "give the file of the base station with --base, or leave --base out"};
 }
 
 /// The part of the recording that is asked for, and whether rover and base share any of it.
@@ -82,7 +83,8 @@ Failure take_times(const SolveRequest& request, SolveInputs& in) {
   in.start = request.start_sow ? place(*request.start_sow).plus_seconds(-0.02) : first;
   in.end = request.end_sow ? place(*request.end_sow).plus_seconds(0.02) : last;
   if (in.start > last || in.end < first)
-    return io::Diagnostic{request.rover, 0, "has no epoch between --start and --end: it goes from " + time_text(first) + " to " + time_text(last),
+    return io::Diagnostic{request.rover, 0,
+                          "has no epoch between --start and --end: it goes from " + time_text(first) + " to " + time_text(last),
                           "--start and --end are GPS seconds of week"};
   in.start = std::max(in.start, first), in.end = std::min(in.end, last);
   if (!in.base) return {};
@@ -90,11 +92,12 @@ Failure take_times(const SolveRequest& request, SolveInputs& in) {
   const double max_age_s = in.options.differencing.base.max_age_s;
   if (base_first > in.end.plus_seconds(0.02) || base_last.plus_seconds(max_age_s) < in.start)
     return io::Diagnostic{request.base, 0,
-                          "does not overlap the rover in time: base from " + time_text(base_first) + " to " + time_text(base_last) + ", rover from " +
-                              time_text(in.start) + " to " + time_text(in.end),
+                          "does not overlap the rover in time: base from " + time_text(base_first) + " to " + time_text(base_last) +
+                              ", rover from " + time_text(in.start) + " to " + time_text(in.end),
                           "get the base file of the rover's day and hour; tags must be GPS time in both"};
   if (base_first > in.start.plus_seconds(1) || base_last.plus_seconds(max_age_s) < in.end)
-    in.notes.push_back("the base covers only a part of the rover's time: base from " + time_text(base_first) + " to " + time_text(base_last));
+    in.notes.push_back("the base covers only a part of the rover's time: base from " + time_text(base_first) + " to " +
+                       time_text(base_last));
   return {};
 }
 
@@ -108,7 +111,8 @@ Failure take_signals(const SolveRequest& request, const std::optional<RigGnss>& 
   const std::vector<gnss::SignalCode> base = in.base ? signals_in(*in.base) : rover;
   std::vector<gnss::SignalCode> missing;
   for (const gnss::SignalCode& s : wanted) {
-    const bool at_rover = std::any_of(rover.begin(), rover.end(), [&](const auto& r) { return r == s || (gnss::same_carrier(r, s) && r.attribute == ' '); });
+    const bool at_rover =
+        std::any_of(rover.begin(), rover.end(), [&](const auto& r) { return r == s || (gnss::same_carrier(r, s) && r.attribute == ' '); });
     const bool at_base = std::any_of(base.begin(), base.end(), [&](const auto& b) { return gnss::same_carrier(b, s); });
     if (!at_rover || !at_base) missing.push_back(s);
     (void)in.options.differencing.selection.wanted.push_back(s);
@@ -131,7 +135,11 @@ Failure take_sigmas(const SolveRequest& request, const std::optional<RigGnss>& r
   for (const auto& [text, pair] : rig->code_sigma_m) {
     gnss::SignalCode code;
     gnss::SignalSigma* entry = gnss::signal_from_text(text.data(), text.size(), code) ? sigmas.entry(code) : nullptr;
-    if (!entry) return io::Diagnostic{request.rig, 0, "gnss.code_sigma_m names more signals than the " + std::to_string(gnss::SigmaModel::kMaxSignals) + " that fit", {}};
+    if (!entry)
+      return io::Diagnostic{request.rig,
+                            0,
+                            "gnss.code_sigma_m names more signals than the " + std::to_string(gnss::SigmaModel::kMaxSignals) + " that fit",
+                            {}};
     entry->code = {pair.x(), pair.y()};
   }
   const RigGnss usual;
@@ -176,7 +184,8 @@ Failure take_base_position(const SolveRequest& request, const Rig& rig, SolveInp
   }
   const double radius_m = in.base_position_e_m.norm();
   if (!(radius_m > 6.25e6 && radius_m < 6.48e6))
-    return io::Diagnostic{file, 0, "the base position is not near the surface of the Earth (" + io::fixed_text(radius_m, 1) + " m from its centre)",
+    return io::Diagnostic{file, 0,
+                          "the base position is not near the surface of the Earth (" + io::fixed_text(radius_m, 1) + " m from its centre)",
                           "give ECEF metres with --base-ecef X,Y,Z"};
   return {};
 }
@@ -192,15 +201,17 @@ Failure take_ephemerides(const SolveRequest& request, SolveInputs& in) {
     if (file.value.ionosphere.present() && !in.ionosphere.present()) in.ionosphere = file.value.ionosphere;
     for (const gnss::Ephemeris& e : file.value.ephemerides) {
       first = first ? std::min(*first, e.toe) : e.toe, last = last ? std::max(*last, e.toe) : e.toe;
-      if (seconds_between(e.toe, in.start) <= kFarthestEphemerisS && seconds_between(in.end, e.toe) <= kFarthestEphemerisS) in.ephemerides.push_back(e);
+      if (seconds_between(e.toe, in.start) <= kFarthestEphemerisS && seconds_between(in.end, e.toe) <= kFarthestEphemerisS)
+        in.ephemerides.push_back(e);
     }
   }
   if (in.ephemerides.empty() && !first)
-    return io::Diagnostic{request.nav.front(), 0, "holds no usable broadcast record", "give a navigation file with GPS, Galileo, BeiDou or QZSS records"};
+    return io::Diagnostic{request.nav.front(), 0, "holds no usable broadcast record",
+                          "give a navigation file with GPS, Galileo, BeiDou or QZSS records"};
   if (in.ephemerides.empty())
     return io::Diagnostic{request.nav.front(), 0,
-                          "no record is of the rover's time: records from " + time_text(*first) + " to " + time_text(*last) + ", rover from " +
-                              time_text(in.start) + " to " + time_text(in.end),
+                          "no record is of the rover's time: records from " + time_text(*first) + " to " + time_text(*last) +
+                              ", rover from " + time_text(in.start) + " to " + time_text(in.end),
                           "get the broadcast navigation file of the rover's day"};
   return {};
 }

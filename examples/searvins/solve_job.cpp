@@ -61,7 +61,8 @@ class Collector {
  public:
   Collector(SolveOutcome& out, bool with_base) : out_(out), with_base_(with_base) {
     if (with_base) {
-      for (std::size_t r = 0; r < gnss::kRejections; ++r) out.rejection_reasons.emplace_back(gnss::name_of(static_cast<gnss::Rejection>(r)));
+      for (std::size_t r = 0; r < gnss::kRejections; ++r)
+        out.rejection_reasons.emplace_back(gnss::name_of(static_cast<gnss::Rejection>(r)));
       out.fix_outcomes.emplace_back("fixed");
       for (int v = 1; v <= static_cast<int>(ambiguity::ResolutionVerdict::contradiction); ++v)
         out.fix_outcomes.emplace_back(ambiguity::name_of(static_cast<ambiguity::ResolutionVerdict>(v)));
@@ -86,7 +87,11 @@ class Collector {
     out_.released_integers += s.released_integers;
     out_.restarts += s.restarted && out_.rows.size() > 1;
     if (!s.smoother_status.ok()) add_count(out_.incidents, std::string{"optimisation: "} + s.smoother_status.what);
-    if (differenced && !differenced->base_status.ok()) add_count(out_.incidents, std::string{"no differences: "} + differenced->base_status.what);
+    const bool differences_used = s.status != estimator::SolutionStatus::spp && s.status != estimator::SolutionStatus::dr;
+    if (differenced && !differenced->base_status.ok())
+      add_count(out_.incidents, std::string{"no differences: "} + differenced->base_status.what);
+    else if (with_base_ && !differences_used)
+      add_count(out_.incidents, "no differences: too few satellites in common with the base");
     if (out_.rows.size() == 1 || seconds_between(last_sky_, s.tag) >= kSkyStepS) take_sky(run.single_point(), differenced, s.tag);
   }
 
@@ -203,14 +208,15 @@ void score(const SolveRequest& request, const SolveInputs& in, SolveOutcome& out
 
 io::FileResult<SolveOutcome> solve(const SolveRequest& request, const SolveInputs& in) {
   SolveOutcome out;
-  const std::unique_ptr<SolverRun> run =
-      in.base ? make_run(request.formulation, in.options) : make_single_point_run(in.options);
-  if (!run) return io::Diagnostic{"--robust", 0, "'" + request.formulation + "' is no formulation", "use batch, scalar, latent or symmetric"};
+  const std::unique_ptr<SolverRun> run = in.base ? make_run(request.formulation, in.options) : make_single_point_run(in.options);
+  if (!run)
+    return io::Diagnostic{"--robust", 0, "'" + request.formulation + "' is no formulation", "use batch, scalar, latent or symmetric"};
   for (const gnss::Ephemeris& e : in.ephemerides)
     if (!run->add_ephemeris(e).ok()) add_count(out.incidents, "ephemeris left out: the store is full");
   if (in.ionosphere.present()) run->set_ionosphere(in.ionosphere);
   if (in.base)
-    if (const Status s = run->set_base_position(in.base_position_e_m); !s.ok()) return io::Diagnostic{request.base, 0, s.what, "give --base-ecef X,Y,Z"};
+    if (const Status s = run->set_base_position(in.base_position_e_m); !s.ok())
+      return io::Diagnostic{request.base, 0, s.what, "give --base-ecef X,Y,Z"};
 
   io::RinexObservationReader rover;
   BaseFeed base;
@@ -235,7 +241,8 @@ io::FileResult<SolveOutcome> solve(const SolveRequest& request, const SolveInput
     } else {
       collector.take(epoch, *solution, *run, solve_ms);
       fixed += solution->status == estimator::SolutionStatus::fix;
-      if (solution->status != estimator::SolutionStatus::dr) out.solved_at_end = seconds_between(epoch.tag, in.end) <= std::max(kEndS, 3 * in.rover.interval_s);
+      if (solution->status != estimator::SolutionStatus::dr)
+        out.solved_at_end = seconds_between(epoch.tag, in.end) <= std::max(kEndS, 3 * in.rover.interval_s);
     }
     collector.take_lagged(run->oldest());
     progress.update(static_cast<std::size_t>(seconds_between(in.start, epoch.tag) * 10) + 1,

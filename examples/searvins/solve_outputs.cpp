@@ -43,7 +43,8 @@ std::vector<double> solve_times(const SolveOutcome& outcome) {
 
 std::string three(const std::vector<double>& values, int decimals, const char* unit) {
   if (values.empty()) return "-";
-  return cell(percentile(values, 0.5), decimals) + " / " + cell(percentile(values, 0.95), decimals) + " / " + cell(percentile(values, 1), decimals) + ' ' + unit;
+  return cell(percentile(values, 0.5), decimals) + " / " + cell(percentile(values, 0.95), decimals) + " / " +
+         cell(percentile(values, 1), decimals) + ' ' + unit;
 }
 
 std::string position_text(const Eigen::Vector3d& p) {
@@ -64,7 +65,8 @@ std::vector<Count> rejections(const SolveOutcome& outcome) {
 std::vector<Count> outcomes(const SolveOutcome& outcome) {
   std::vector<Count> counts;
   for (std::size_t v = 0; v < outcome.fix_outcomes.size(); ++v) {
-    const auto n = std::count_if(outcome.epochs.begin(), outcome.epochs.end(), [v](const ReportEpoch& e) { return e.fix_outcome == static_cast<int>(v); });
+    const auto n = std::count_if(outcome.epochs.begin(), outcome.epochs.end(),
+                                 [v](const ReportEpoch& e) { return e.fix_outcome == static_cast<int>(v); });
     if (n > 0) counts.emplace_back(outcome.fix_outcomes[v], n);
   }
   return counts;
@@ -76,10 +78,13 @@ double baseline_km(const SolveInputs& in, const SolveOutcome& outcome) {
 }
 
 std::size_t status_count(const SolveOutcome& outcome, io::SolutionStatus status) {
-  return static_cast<std::size_t>(std::count_if(outcome.rows.begin(), outcome.rows.end(), [status](const io::TrajectoryRow& r) { return r.status == status; }));
+  return static_cast<std::size_t>(
+      std::count_if(outcome.rows.begin(), outcome.rows.end(), [status](const io::TrajectoryRow& r) { return r.status == status; }));
 }
 
-std::string formulation_text(const SolveRequest& request, const SolveInputs& in) { return in.base ? request.formulation : "single point (no base)"; }
+std::string formulation_text(const SolveRequest& request, const SolveInputs& in) {
+  return in.base ? request.formulation : "single point (no base)";
+}
 
 std::string mode_text(const SolveRequest& request) {
   switch (request.options.resolution.mode) {
@@ -109,11 +114,11 @@ std::vector<ReportEntry> run_figures(const SolveInputs& in, const SolveOutcome& 
   if (skipped) lines.emplace_back("skipped", std::to_string(skipped));
   if (in.base) {
     lines.emplace_back("baseline", cell(baseline_km(in, outcome), 2) + " km");
-    lines.emplace_back("base age, median / 95 % / max", three(finite(outcome.ages_s), 2, "s"));
+    lines.emplace_back("base age P50 / P95 / max", three(finite(outcome.ages_s), 2, "s"));
     lines.emplace_back("window restarts", std::to_string(outcome.restarts));
     lines.emplace_back("integers taken back", std::to_string(outcome.released_integers));
   }
-  lines.emplace_back("update, median / 95 % / max", three(solve_times(outcome), 2, "ms"));
+  lines.emplace_back("update P50 / P95 / max", three(solve_times(outcome), 2, "ms"));
   lines.emplace_back("whole run", io::fixed_text(outcome.wall_s, 2) + " s");
   return lines;
 }
@@ -122,8 +127,12 @@ std::vector<ReportEntry> settings(const SolveRequest& request, const SolveInputs
   std::vector<ReportEntry> s;
   const auto name = [](const std::string& path) { return std::filesystem::path{path}.filename().string(); };
   s.emplace_back("rover", name(request.rover));
-  if (in.base) s.emplace_back("base", name(request.base)), s.emplace_back("base position, ECEF m", position_text(in.base_position_e_m)), s.emplace_back("base position from", in.base_position_source);
-  for (const std::string& nav : request.nav) s.emplace_back("navigation", name(nav));
+  if (in.base)
+    s.emplace_back("base", name(request.base)), s.emplace_back("base, ECEF m", position_text(in.base_position_e_m)),
+        s.emplace_back("base position from", in.base_position_source);
+  std::string navigation;
+  for (const std::string& nav : request.nav) (navigation += navigation.empty() ? "" : ", ") += name(nav);
+  s.emplace_back("navigation", navigation);
   s.emplace_back("robust formulation", formulation_text(request, in));
   if (in.base) {
     s.emplace_back("ambiguities", mode_text(request));
@@ -161,10 +170,13 @@ std::string title_of(const SolveRequest& request) {
 std::string subtitle_of(const SolveRequest& request, const SolveInputs& in, const SolveOutcome& outcome) {
   const CivilTime c = civil_from_gps(in.start);
   char date[48];
-  std::snprintf(date, sizeof date, "%04d-%02d-%02d %02d:%02d:%02.0f GPS time", c.year, c.month, c.day, c.hour, c.minute, std::floor(c.second));
+  std::snprintf(date, sizeof date, "%04d-%02d-%02d %02d:%02d:%02.0f GPS time", c.year, c.month, c.day, c.hour, c.minute,
+                std::floor(c.second));
   std::string text = std::string{date} + ", " + std::to_string(outcome.rover_epochs) + " rover epochs";
   if (in.rover.interval_s > 0) text += " at " + io::fixed_text(1 / in.rover.interval_s, in.rover.interval_s > 1 ? 3 : 0) + " Hz";
-  if (in.base) text += ", base " + cell(baseline_km(in, outcome), 2) + " km away, " + request.formulation + " formulation, " + mode_text(request) + " ambiguity resolution";
+  if (in.base)
+    text += ", base " + cell(baseline_km(in, outcome), 2) + " km away, " + request.formulation + " formulation, " + mode_text(request) +
+            " ambiguity resolution";
   return text;
 }
 
@@ -173,7 +185,8 @@ RunReport report_of(const SolveRequest& request, const SolveInputs& in, const So
   report.title = title_of(request), report.subtitle = subtitle_of(request, in, outcome), report.command = request.command;
   report.rows = outcome.rows, report.epochs = outcome.epochs;
   report.rejection_reasons = outcome.rejection_reasons, report.fix_outcomes = outcome.fix_outcomes;
-  if (in.base && request.options.resolution.mode != ambiguity::ResolutionMode::off) report.success_rate_gate = in.options.resolution.min_success_rate;
+  if (in.base && request.options.resolution.mode != ambiguity::ResolutionMode::off)
+    report.success_rate_gate = in.options.resolution.min_success_rate;
   report.satellites = outcome.satellites, report.truth = in.truth, report.evaluation = outcome.evaluation;
   report.figures = run_figures(in, outcome), report.settings = settings(request, in), report.notes = notes(in, outcome);
   return report;
@@ -190,16 +203,22 @@ void member_errors(JsonWriter& json, const char* key, const ErrorFigures& f) {
 }
 
 void member_distribution(JsonWriter& json, const char* key, const std::vector<double>& v) {
-  json.begin_object(key).member("median", percentile(v, 0.5)).member("p95", percentile(v, 0.95)).member("max", percentile(v, 1)).end_object();
+  json.begin_object(key)
+      .member("median", percentile(v, 0.5))
+      .member("p95", percentile(v, 0.95))
+      .member("max", percentile(v, 1))
+      .end_object();
 }
 
 std::string summary_json(const SolveRequest& request, const SolveInputs& in, const SolveOutcome& outcome) {
   JsonWriter json;
   json.begin_object().member("schema", 1).member("program", std::string{"searvins "} + kVersionString).member("command", request.command);
   json.begin_object("settings");
-  for (const auto& [label, value] : settings(request, in)) json.member(label == "navigation" ? "navigation" : label, value);
+  for (const auto& [label, value] : settings(request, in)) json.member(label, value);
   json.end_object();
-  json.member("rover_epochs", outcome.rover_epochs).member("solutions", outcome.rows.size()).member("solution_at_end", outcome.solved_at_end);
+  json.member("rover_epochs", outcome.rover_epochs)
+      .member("solutions", outcome.rows.size())
+      .member("solution_at_end", outcome.solved_at_end);
   json.begin_object("status");
   for (std::size_t s = 0; s < io::kSolutionStatuses; ++s) {
     const auto status = static_cast<io::SolutionStatus>(s);
@@ -209,7 +228,8 @@ std::string summary_json(const SolveRequest& request, const SolveInputs& in, con
   if (const auto& e = outcome.evaluation) {
     json.begin_object("errors_m").member("epochs", e->epochs.size()).member("availability_pct", e->availability_pct);
     json.member("below_1p0_pct", e->below_1p0_pct).member("below_1p5_pct", e->below_1p5_pct);
-    member_errors(json, "horizontal", e->horizontal), member_errors(json, "spatial", e->spatial), member_errors(json, "vertical", e->vertical);
+    member_errors(json, "horizontal", e->horizontal), member_errors(json, "spatial", e->spatial),
+        member_errors(json, "vertical", e->vertical);
     json.member("fixed", e->fixed).member("correct_fixes", e->fixed - e->wrong_fixes).member("wrong_fixes", e->wrong_fixes);
     json.member("fix_rate_pct", e->fix_rate_pct);
     member_errors(json, "fixed_horizontal", e->fixed_horizontal);
@@ -240,10 +260,13 @@ std::string summary_text(const SolveRequest& request, const SolveInputs& in, con
   for (const auto& [label, value] : run_figures(in, outcome)) table.row({label, value});
   for (std::size_t s = 0; s < io::kSolutionStatuses; ++s) {
     const auto status = static_cast<io::SolutionStatus>(s);
-    if (const std::size_t n = status_count(outcome, status)) table.row({io::name_of(status), std::to_string(n) + "  " + percent(n, outcome.rover_epochs)});
+    if (const std::size_t n = status_count(outcome, status))
+      table.row({io::name_of(status), std::to_string(n) + "  " + percent(n, outcome.rover_epochs)});
   }
   if (const auto& e = outcome.evaluation) {
-    const auto errors = [](const ErrorFigures& f, int d) { return cell(f.rmse_m, d) + " / " + cell(f.p95_m, d) + " / " + cell(f.max_m, d) + " m"; };
+    const auto errors = [](const ErrorFigures& f, int d) {
+      return cell(f.rmse_m, d) + " / " + cell(f.p95_m, d) + " / " + cell(f.max_m, d) + " m";
+    };
     table.row({"scored epochs", std::to_string(e->epochs.size())});
     table.row({"H RMSE / P95 / max", errors(e->horizontal, 3)});
     table.row({"3-D RMSE / P95 / max", errors(e->spatial, 3)});
@@ -264,7 +287,9 @@ std::string write_outputs(const std::string& folder, const SolveRequest& request
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed) return "the folder cannot be made: " + failed.message();
-  const auto write = [&folder](const char* name, const std::string& text) { return io::write_text_file((std::filesystem::path{folder} / name).string(), text); };
+  const auto write = [&folder](const char* name, const std::string& text) {
+    return io::write_text_file((std::filesystem::path{folder} / name).string(), text);
+  };
   io::RtklibHeader header;
   header.program = std::string{"searvins "} + kVersionString;
   header.input_files.push_back(request.rover);

@@ -6,6 +6,8 @@
 
 namespace searvins::examples {
 
-std::unique_ptr<SolverRun> make_scalar_run(const estimator::RtkOptions& options) { return std::make_unique<RtkRun<robust::ScalarRows>>(options); }
+std::unique_ptr<SolverRun> make_scalar_run(const estimator::RtkOptions& options) {
+  return std::make_unique<RtkRun<robust::ScalarRows>>(options);
+}
 
 }  // namespace searvins::examples

@@ -6,6 +6,8 @@
 
 namespace searvins::examples {
 
-std::unique_ptr<SolverRun> make_symmetric_run(const estimator::RtkOptions& options) { return std::make_unique<RtkRun<robust::LatentPivotSymmetric>>(options); }
+std::unique_ptr<SolverRun> make_symmetric_run(const estimator::RtkOptions& options) {
+  return std::make_unique<RtkRun<robust::LatentPivotSymmetric>>(options);
+}
 
 }  // namespace searvins::examples

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// \file
-/// What `searvins solve` needs of an estimator, whatever its robust formulation. The formulations are template arguments of the library, and one
-/// instantiation takes a compiler about a minute: each has a source file of its own (solve_*.cpp), and the command sees this interface alone.
+/// What `searvins solve` needs of an estimator, whatever its robust formulation. The formulations are template arguments of the
+/// library, and one instantiation takes a compiler about a minute: each has a source file of its own (solve_*.cpp), and the
+/// command sees this interface alone.
 #pragma once
 
 #include <Eigen/Core>

@@ -74,7 +74,10 @@ function niceStep(span, count) {
   return (m <= 1 ? 1 : m <= 2 ? 2 : m <= 5 ? 5 : 10) * unit;
 }
 function linearTicks(lo, hi, count) {
-  const step = niceStep(hi - lo, count), out = [];
+  const inside = s => Math.floor(hi / s + 1e-9) - Math.ceil(lo / s - 1e-9) + 1;
+  let step = niceStep(hi - lo, count);
+  if (inside(step) < Math.min(3, count)) step = niceStep(hi - lo, 2 * count); /* a step just too coarse leaves zero alone */
+  const out = [];
   for (let v = Math.ceil(lo / step - 1e-9) * step; v <= hi + step * 1e-9; v += step) out.push(Math.abs(v) < step * 1e-9 ? 0 : v);
   return out;
 }

@@ -33,8 +33,8 @@ h2 { font-size: 15px; font-weight: 650; margin: 0; }
 .sub { color: var(--muted); margin: 0; }
 code { font: 12px/1.5 ui-monospace, SFMono-Regular, Menlo, Consolas, monospace; overflow-wrap: anywhere; }
 .command { margin: 10px 0 0; padding: 7px 10px; background: var(--shade); border-radius: 6px; }
-.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(138px, 1fr)); gap: 12px; margin: 18px 0; }
-.tile { background: var(--card); border: 1px solid var(--line); border-radius: 10px; padding: 11px 14px 10px; }
+.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(128px, 1fr)); gap: 12px; margin: 18px 0; }
+.tile { background: var(--card); border: 1px solid var(--line); border-radius: 10px; padding: 11px 12px 10px; }
 .tile b { display: block; font-size: 23px; line-height: 1.25; font-weight: 640; letter-spacing: -0.01em; white-space: nowrap; }
 .tile b small { font-size: 13px; font-weight: 500; color: var(--muted); margin-left: 3px; letter-spacing: 0; }
 .tile span { color: var(--muted); font-size: 12px; }

@@ -462,7 +462,7 @@ class Elimination {
   /// Scales the rows of a factor by sqrt(w) into `rows_`, column by column, the residual last, and finds each column's span of non-zero rows.
   template <class F>
   void scale_rows(WindowType& window, const FactorRecord<F>& r) {
-    std::array<Scalar, F::max_rows> root;
+    std::array<Scalar, F::max_rows> root{};
     for (int i = 0; i < r.rows; ++i) root[at(i)] = std::sqrt(r.weights[at(i)]);
     int column = 0;
     for (int k = 0; k < r.keys; ++k) {
