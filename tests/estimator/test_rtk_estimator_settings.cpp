@@ -82,7 +82,7 @@ const Flip kFlips[] = {
     {"max_gap_s", [](RtkOptions& o) { o.max_gap_s = 10; }},
     {"solver.max_iterations", [](RtkOptions& o) { o.solver.max_iterations = 2; }},
     {"solver.step_tolerance", [](RtkOptions& o) { o.solver.step_tolerance = 1e-6; }},
-    {"solver.relinearise_threshold", [](RtkOptions& o) { o.solver.relinearise_threshold = 0.1; }},
+    {"solver.relinearise_threshold", [](RtkOptions& o) { o.solver.relinearise_threshold = 0; }},
     {"solver.prior", [](RtkOptions& o) { o.solver.prior = smoother::PriorLinearisation::first_estimate; }},
     {"differencing.selection.wanted", [](RtkOptions& o) { (void)o.differencing.selection.wanted.push_back(signal("G1C")); }},
     {"differencing.screening.elevation_mask_rad", [](RtkOptions& o) { o.differencing.screening.elevation_mask_rad = 0.6; }},

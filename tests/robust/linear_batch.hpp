@@ -28,7 +28,9 @@ using VectorX = Eigen::Matrix<S, Eigen::Dynamic, 1>;
 /// A B without Eigen's blocked kernels, which would triple the compile time of these tests.
 template <class A, class B>
 auto times(const Eigen::MatrixBase<A>& a, const Eigen::MatrixBase<B>& b) {
-  return Eigen::Matrix<typename A::Scalar, Eigen::Dynamic, B::ColsAtCompileTime>(a.derived().lazyProduct(b.derived()));
+  using Product = Eigen::Matrix<typename A::Scalar, Eigen::Dynamic, B::ColsAtCompileTime>;
+  if (a.cols() == 0) return Product(Product::Zero(a.rows(), b.cols()));  // an empty block has no address to offset
+  return Product(a.derived().lazyProduct(b.derived()));
 }
 
 /// Dense A^-1 B for a positive definite A, by elimination without pivoting.

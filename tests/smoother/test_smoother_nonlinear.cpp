@@ -211,8 +211,8 @@ TEST_CASE("P4: under first_estimate the linearisation points of prior-connected 
       });
     // The step marginalises at its end, so look at the points that its optimise() must have left alone.
     REQUIRE(d.step().status.ok());
-    for (const auto& [id, theta] : fixed)
-      w.visit_variable(id, [&, t = theta]<class V>(smoother::VariableRecord<V>& r) {
+    for (const auto& point : fixed)
+      w.visit_variable(point.first, [&, id = point.first, t = point.second]<class V>(smoother::VariableRecord<V>& r) {
         if (w.info(id).stamp == GpsTime{d.epoch}) return;  // the slot has a new tenant
         ++held;
         CHECK(std::memcmp(r.theta.v.data(), t.data(), sizeof(double) * V::dof) == 0);

@@ -143,7 +143,10 @@ class FixedLagSmoother {
       for (int attempt = 0; attempt <= options.max_damping_steps; ++attempt) {
         report.fronts_factored += elimination_.front_count() - elimination_.first_dirty();
         const auto failure_report = elimination_.factorise(window_, prior_, damping);
-        if (!failure_report.ok()) return give_up(report, describe(failure_report, report.where));
+        if (!failure_report.ok()) {
+          const Status why = describe(failure_report, report.where);  // fills `where` before the report is copied
+          return give_up(report, why);
+        }
         elimination_.solve(window_);
         const Scalar proposed = evaluate<Which::candidate>();
         step = largest_step();
