@@ -2,6 +2,7 @@
 #include "rtk_under_test.hpp"
 
 #include <searvins/estimator/rtk_estimator.hpp>
+#include <searvins/estimator/rtk_problem.hpp>
 
 namespace searvins::test {
 

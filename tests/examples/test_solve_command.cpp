@@ -13,34 +13,14 @@
 
 #include "examples/support/evaluation.hpp"
 #include "examples/support/json.hpp"
+#include "command_runner.hpp"
 #include "examples/support/truth.hpp"
-
-#if __has_include(<sys/wait.h>)
-#include <sys/wait.h>
-#endif
 
 #ifdef SEARVINS_COMMAND
 namespace {
 
 using namespace searvins;
-
-struct Outcome {
-  int exit_code{-1};
-  std::string output;  ///< stdout and stderr
-};
-
-Outcome run(const std::string& arguments) {
-  Outcome outcome;
-  std::FILE* pipe = popen(("'" SEARVINS_COMMAND "' " + arguments + " 2>&1").c_str(), "r");
-  REQUIRE(pipe);
-  char block[4096];
-  for (std::size_t n; (n = std::fread(block, 1, sizeof block, pipe)) > 0;) outcome.output.append(block, n);
-  const int status = pclose(pipe);
-  if (WIFEXITED(status)) outcome.exit_code = WEXITSTATUS(status);
-  return outcome;
-}
-
-bool has(const Outcome& outcome, const std::string& part) { return outcome.output.find(part) != std::string::npos; }
+using namespace searvins::test;
 
 /// A folder for spoilt copies of the bundled recording and for results.
 struct Fixture {

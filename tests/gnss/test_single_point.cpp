@@ -13,6 +13,8 @@
 #include <vector>
 
 #include <searvins/gnss/single_point.hpp>
+#include <searvins/gnss/single_point_problem.hpp>
+#include <searvins/gnss/single_point_solution.hpp>
 
 #include "simulated_sky.hpp"
 #include "support/property.hpp"

@@ -8,6 +8,8 @@
 #include <limits>
 #include <utility>
 
+#include <searvins/robust/shared_pivot.hpp>
+
 #include "linear_batch.hpp"
 
 using searvins::StatusCode;

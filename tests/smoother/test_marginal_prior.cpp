@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The prior after marginalisation is the dense Schur complement; equivalent ways of stating a problem give one answer.
-#include "linear_problem.hpp"
-
 #include <algorithm>
 #include <memory>
+
+#include <searvins/smoother/marginal_prior.hpp>
+
+#include "linear_problem.hpp"
 
 using namespace searvins;
 using namespace searvins::test;

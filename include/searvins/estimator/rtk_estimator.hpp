@@ -74,12 +74,12 @@ class RtkEstimator {
     RtkSolution out = begin(rover, tracked);
     started_ = true, last_tag_ = rover.tag;
     const Status differenced = difference(rover, tracked, out);
-    if (!differenced.ok() || usable_satellites() < options_.min_satellites) {
+    if (differenced.ok() && epoch_.satellites >= options_.min_satellites && extend(out)) {
+      estimate(out);
+    } else {
       continuation_.skip_epoch();
-      return without_differences(tracked, out), out;
+      without_differences(tracked, out);
     }
-    extend(tracked, out);
-    estimate(out);
     return out;
   }
 
@@ -92,7 +92,8 @@ class RtkEstimator {
   /// The local frame of the window: East-North-Up where it was started.
   [[nodiscard]] const geodesy::LocalFrame& frame() const { return frame_; }
 
-  /// The smoothed estimate of the oldest epoch of the window: what is known `lag_s` later. nullptr while there is no window.
+  /// The smoothed estimate of the oldest epoch of the window: what is known `lag_s` later. Errors: no_data while there is
+  /// no window.
   struct LaggedState {
     GpsTime time{};
     Eigen::Vector3d position_e_m{Eigen::Vector3d::Zero()};
@@ -177,28 +178,14 @@ class RtkEstimator {
     return epoch_.base_status;
   }
 
-  [[nodiscard]] int usable_satellites() const {
-    int n = 0;
-    gnss::SatelliteId last{};
-    for (const gnss::CorrectedSignal& s : epoch_.signals) {  // sorted by satellite
-      if (s.satellite == last) continue;
-      last = s.satellite;
-      ++n;
-    }
-    return n;
-  }
-
   /// Without double differences: the better of prediction and single point, said so.
   void without_differences(const Result<gnss::TrackedPosition>& tracked, RtkSolution& out) {
     out.satellites = tracked.ok() ? single_point_.used : 0;
-    if (tracked.ok() && tracked->status != gnss::TrackStatus::coasted) {
-      out.status = SolutionStatus::spp;
-      set_from_tracker(*tracked, out);
-    } else if (tracked.ok()) {
-      out.status = SolutionStatus::dr;
+    out.status = SolutionStatus::dr;
+    if (tracked.ok()) {
+      if (tracked->status != gnss::TrackStatus::coasted) out.status = SolutionStatus::spp;
       set_from_tracker(*tracked, out);
     } else {
-      out.status = SolutionStatus::dr;
       out.position_e_m = predicted_e_m_, out.velocity_e_mps = predicted_v_e_mps_;
       out.covariance_enu_m2 = Eigen::Matrix3d::Identity() * predicted_sigma_m_ * predicted_sigma_m_;
       out.velocity_covariance_enu = Eigen::Matrix3d::Identity() * last_velocity_variance_;
@@ -213,9 +200,9 @@ class RtkEstimator {
 
   // ---- extend: state, factors, ambiguities -----------------------------------------------------------------------------------------------
 
-  void extend(const Result<gnss::TrackedPosition>& tracked, RtkSolution& out) {
-    (void)tracked;
-    out.satellites = usable_satellites();
+  /// False when the state was refused (smoother_status says why): the window is as it was.
+  [[nodiscard]] bool extend(RtkSolution& out) {
+    out.satellites = epoch_.satellites;
     continuation_.begin_epoch();
     select_phases();
     const Eigen::Vector3d start_e_m = snapshot_position();
@@ -231,7 +218,7 @@ class RtkEstimator {
     const auto state = smoother_.add_variable(start, out.time);
     if (!state.ok()) {
       out.smoother_status = state.status();
-      return;
+      return false;
     }
     if (window_running())
       add(gnss::WhiteJerkFactor{nodes_.back().state, *state, std::max(1e-3, since_last(out)), options_.jerk_psd_m2ps5}, out);
@@ -243,6 +230,7 @@ class RtkEstimator {
     code_information_share_ = 1 / correlation_factor(out);
     for (int g = 0; g < static_cast<int>(epoch_.groups.size()); ++g) add_group(g, *state, start_e_m, out);
     if (options_.use_doppler) add_doppler(*state, out);
+    return true;
   }
 
   /// n epochs within the correlation time of code errors are worth one, so each counts for 1/n. Instantaneous ambiguities do not add epochs up.
@@ -621,7 +609,7 @@ class RtkEstimator {
     }
   }
 
-  /// Integers of earlier epochs that the float without them contradicts, or that a newly resolved state would get another value for.
+  /// Takes out integers of earlier epochs that the float without them contradicts.
   void release_contradicted(RtkSolution& out) {
     for (std::size_t i = 0; i < held_.size();) {
       const Held h = held_[i];
