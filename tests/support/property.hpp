@@ -68,7 +68,7 @@ inline Eigen::MatrixXd random_spd(Rng& rng, int n, double condition = 1e3) {
 /// ||a - b|| <= tolerance * (1 + ||b||), for vectors and matrices.
 template <class A, class B>
 bool close(const A& a, const B& b, double tolerance) {
-  return (a - b).norm() <= tolerance * (1.0 + b.norm());
+  return static_cast<double>((a - b).norm()) <= tolerance * (1.0 + static_cast<double>(b.norm()));
 }
 
 }  // namespace searvins::test
