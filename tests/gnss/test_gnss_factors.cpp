@@ -198,7 +198,7 @@ void add_epoch(SnapshotSmoother& smoother, const Snapshot& s, smoother::Key<Pva>
       f.pivot_ambiguity = ambiguities[static_cast<std::size_t>(pivot)];
     }
     if constexpr (Form<Loss>::has_latent) {
-      const SnapshotSmoother::WindowType::Values<smoother::Which::estimate> values{smoother.window()};
+      const auto values = smoother.window().values(smoother::Which::estimate);
       PivotError start;
       start.value = f.initial_latent(values);
       const auto latent = smoother.add_variable(start, GpsTime{1});

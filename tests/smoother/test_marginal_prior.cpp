@@ -72,7 +72,7 @@ TEST_CASE("the prior left by the oldest state is the dense Schur complement of i
     Eigen::Vector4d x0, s;
     x0 << p.smoother->find(p.b)->value, p.smoother->find(p.c)->value;
     auto& window = p.smoother->window();
-    x0 << window.record(p.b)->prior_theta.value, window.record(p.c)->prior_theta.value;
+    x0 << (*window.record(p.b))[smoother::Which::prior].value, (*window.record(p.c))[smoother::Which::prior].value;
     s = S * x0 - (g.tail(4) - gain * g.head(5));  // gradient at the expansion point
     const int rb = window.info(window.id_of(p.b)).prior, rc = window.info(window.id_of(p.c)).prior;
     const int row[] = {rb, rb + 1, rb + 2, rc};

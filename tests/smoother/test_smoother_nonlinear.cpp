@@ -206,7 +206,7 @@ TEST_CASE("P4: under first_estimate the linearisation points of prior-connected 
     for (int id : d.s->prior().variables)
       w.visit_variable(id, [&]<class V>(smoother::VariableRecord<V>& r) {
         Eigen::Vector3d theta = Eigen::Vector3d::Zero();
-        theta.head<V::dof>() = r.theta.v;
+        theta.head<V::dof>() = r[smoother::Which::theta].v;
         fixed.emplace_back(static_cast<int>(id), theta);
       });
     // The step marginalises at its end, so look at the points that its optimise() must have left alone.
@@ -215,7 +215,7 @@ TEST_CASE("P4: under first_estimate the linearisation points of prior-connected 
       w.visit_variable(point.first, [&, id = point.first, t = point.second]<class V>(smoother::VariableRecord<V>& r) {
         if (w.info(id).stamp == GpsTime{d.epoch}) return;  // the slot has a new tenant
         ++held;
-        CHECK(std::memcmp(r.theta.v.data(), t.data(), sizeof(double) * V::dof) == 0);
+        CHECK(std::memcmp(r[smoother::Which::theta].v.data(), t.data(), sizeof(double) * V::dof) == 0);
       });
     const auto P = d.s->covariance(d.last);
     REQUIRE(P.ok());

@@ -43,7 +43,7 @@ class FixedLagSmoother {
  public:
   using Scalar = typename Problem::Scalar;
   using WindowType = Window<Problem>;
-  using EliminationType = Elimination<Problem>;
+  using EliminationType = Elimination<typename WindowType::TablesType, elimination_sizes<Problem>()>;
   using Options = OptimiseOptions<Scalar>;
   using Report = OptimiseReport<Scalar>;
 
@@ -81,41 +81,49 @@ class FixedLagSmoother {
   Status set_value(const Key<V>& key, const V& value) {
     VariableRecord<V>* r = window_.record(key);
     if (!r) return failure(StatusCode::unknown_key, "the variable does not live (any more)");
-    r->x = value;
-    r->delta = r->theta.local(value);
+    const int id = window_.id_of(key);
+    (*r)[Which::estimate] = value;
+    Eigen::Map<Tangent<V>>{tables().delta.data() + window_.info(id).tangent} = (*r)[Which::theta].local(value);
+    for (int f : tables().living_factors) {
+      FactorInfo& factor = tables().factor(f);
+      const int* const ids = tables().variables_of(factor);
+      if (std::find(ids, ids + factor.keys, id) != ids + factor.keys) factor.evaluated = false;
+    }
     return ok_status();
   }
   template <class F>
-  [[nodiscard]] const F* find_factor(const Key<F>& key) {
-    FactorRecord<F>* r = window_.factor_record(key);
-    return r ? &r->factor : nullptr;
+  [[nodiscard]] const F* find_factor(const Key<F>& key) const {
+    return window_.find_factor(key);
   }
   /// Robust weights of a factor's rows at the last accepted estimate, nullptr when the key is stale.
   template <class F>
-  [[nodiscard]] const Scalar* weights(const Key<F>& key) {
-    FactorRecord<F>* r = window_.factor_record(key);
-    return r ? r->weights_now.data() : nullptr;
+  [[nodiscard]] const Scalar* weights(const Key<F>& key) const {
+    const int id = window_.id_of_factor(key);
+    return id < 0 ? nullptr : window_.tables.weights_now.data() + window_.tables.factor(id).first_row;
   }
   /// Whitened rows of a factor at the last evaluated estimate, nullptr when the key is stale.
   template <class F>
-  [[nodiscard]] const Scalar* whitened_rows(const Key<F>& key) {
-    FactorRecord<F>* r = window_.factor_record(key);
-    return r ? r->e.data() : nullptr;
+  [[nodiscard]] const Scalar* whitened_rows(const Key<F>& key) const {
+    const int id = window_.id_of_factor(key);
+    return id < 0 ? nullptr : window_.tables.e.data() + window_.tables.factor(id).first_row;
   }
 
   /// Switches all factors of a type off or on. Off, they keep their place and count for nothing, also when marginalised: what the prior should never
   /// contain (integer priors) is switched off before marginalise_oldest().
   template <class F>
   void set_enabled(bool on) {
-    if (window_.template enabled<F>() == on) return;
-    window_.template set_enabled<F>(on);
+    constexpr int type = WindowType::FactorTypes::template index_of<F>();
+    static_assert(type >= 0, "this factor type is not listed in Problem::Factors");
+    bool& enabled = tables().type_enabled[static_cast<std::size_t>(type)];
+    if (enabled == on) return;
+    enabled = on;
     const bool analysed = ensure_analysis();  // where not, every front is dirty already
-    window_.for_each_factor([&]<class G>(FactorRecord<G>& r, int) {
-      if constexpr (std::is_same_v<G, F>) {
-        r.linearised = false;  // while off it does not follow its variables
-        if (analysed) elimination_.mark_dirty_from(r.front);
-      }
-    });
+    for (int id : tables().living_factors) {
+      FactorInfo& f = tables().factor(id);
+      if (f.type != type) continue;
+      f.linearised = f.evaluated = false;  // while off it does not follow its variables
+      if (analysed) elimination_.mark_dirty_from(f.front);
+    }
   }
 
   [[nodiscard]] const WindowType& window() const { return window_; }
@@ -131,7 +139,7 @@ class FixedLagSmoother {
     }
     save();
     if (!ensure_analysis()) return give_up(report, failure(StatusCode::capacity_exceeded, "Problem::member_capacity is too small for this window"));
-    Scalar cost = evaluate<Which::estimate>();
+    Scalar cost = evaluate(Which::estimate);
     report.initial_cost = report.final_cost = cost;
     if (!std::isfinite(cost)) return give_up(report, failure(StatusCode::non_finite, "the cost of the present estimate is not finite: a factor or a value is broken"));
     for (report.iterations = 1; report.iterations <= options.max_iterations; ++report.iterations) {
@@ -142,13 +150,13 @@ class FixedLagSmoother {
       Scalar step = 0;
       for (int attempt = 0; attempt <= options.max_damping_steps; ++attempt) {
         report.fronts_factored += elimination_.front_count() - elimination_.first_dirty();
-        const auto failure_report = elimination_.factorise(window_, prior_, damping);
+        const auto failure_report = factorise(damping);
         if (!failure_report.ok()) {
           const Status why = describe(failure_report, report.where);  // fills `where` before the report is copied
           return give_up(report, why);
         }
-        elimination_.solve(window_);
-        const Scalar proposed = evaluate<Which::candidate>();
+        solve();
+        const Scalar proposed = evaluate(Which::candidate);
         step = largest_step();
         if (std::isfinite(proposed) && proposed <= cost + kCostRounding * (Scalar(1) + std::abs(cost))) {
           cost = proposed, accepted = true;
@@ -162,7 +170,7 @@ class FixedLagSmoother {
       if (!accepted) {
         // A vanishing step that rounding keeps from decreasing the cost is convergence, not failure.
         if (step <= options.step_tolerance) {
-          (void)evaluate<Which::estimate>();
+          (void)evaluate(Which::estimate);
           report.last_step = step;
           report.status = ok_status();
           return report;
@@ -193,10 +201,10 @@ class FixedLagSmoother {
       report.status = failure(StatusCode::capacity_exceeded, "Problem::member_capacity is too small for this window");
       return report;
     }
-    (void)evaluate<Which::estimate>();
+    (void)evaluate(Which::estimate);
     relinearise(options);
     if (damped_) elimination_.mark_dirty_from(0), damped_ = false;
-    const auto failed = elimination_.factorise(window_, prior_, Scalar(0), math::ZeroPivot::skip, 0);
+    const auto failed = factorise(0, math::ZeroPivot::skip, 0);
     if (!failed.ok()) {
       UnderDetermined where;
       report.status = describe(failed, where);
@@ -213,12 +221,8 @@ class FixedLagSmoother {
   /// Forgets everything: no variables, factors or prior; every key is stale afterwards.
   void clear() {
     prior_.clear(window_);
-    int n = 0;
-    window_.for_each_factor([&](auto&, int id) { doomed_[static_cast<std::size_t>(n++)] = id; });
-    for (int i = 0; i < n; ++i) window_.erase_factor(doomed_[static_cast<std::size_t>(i)]);
-    n = 0;
-    window_.for_each_variable([&](auto&, int id) { row_[static_cast<std::size_t>(n++)] = id; });
-    for (int i = 0; i < n; ++i) window_.erase_variable(row_[static_cast<std::size_t>(i)]);
+    (void)window_.erase_factors([](int) { return true; });
+    (void)window_.erase_variables([](int) { return true; });
     elimination_.clear();
     changed_ = true, damped_ = false;
   }
@@ -237,7 +241,7 @@ class FixedLagSmoother {
     }
     if (n > ld) return failure(StatusCode::invalid_argument, "the leading dimension is smaller than the joint tangent space", n, ld);
     if (const Status s = ensure_factor(); !s.ok()) return s;
-    const int size = covariance_.joint(window_, elimination_, ids_.data(), count, out, ld);
+    const int size = covariance_.joint(tables(), elimination_, ids_.data(), count, out, ld);
     if (size < 0) return failure(StatusCode::under_determined, "a local variable without factors has no covariance");
     return size;
   }
@@ -252,22 +256,24 @@ class FixedLagSmoother {
   }
 
   /// Sum of rho at the present estimate, prior included.
-  [[nodiscard]] Scalar cost() { return evaluate<Which::estimate>(); }
+  [[nodiscard]] Scalar cost() { return evaluate(Which::estimate); }
 
  private:
   /// Share of the cost that its summation may round away: a step within it is no increase.
   static constexpr Scalar kCostRounding = std::max(Scalar(1e-9), 16 * std::numeric_limits<Scalar>::epsilon());
 
-  /// Rows and weights of every enabled factor at the values W; returns the total cost.
-  template <Which W>
-  Scalar evaluate() {
-    Scalar total = prior_.template evaluate<W>(window_);
-    const typename WindowType::template Values<W> values{window_};
-    window_.for_each_factor([&]<class F>(FactorRecord<F>& r, int) {
-      if (!window_.template enabled<F>()) return;
-      r.factor.evaluate(values, r.e.data());
-      total += r.factor.weigh(r.e.data(), r.weights_now.data());
-    });
+  [[nodiscard]] typename WindowType::TablesType& tables() { return window_.tables; }
+
+  /// Rows and weights of every enabled factor at the values `which`; returns the total cost. At the estimate, rows that are there already stay.
+  Scalar evaluate(Which which) {
+    Scalar total = prior_.evaluate(window_, which);
+    for (int id : tables().living_factors) {
+      FactorInfo& f = tables().factor(id);
+      if (!tables().enabled(f)) continue;
+      const bool known = which == Which::estimate && f.evaluated;
+      total += known ? tables().cost[static_cast<std::size_t>(id)] : window_.evaluate(id, which);
+      f.evaluated = which == Which::estimate;
+    }
     return total;
   }
 
@@ -279,40 +285,53 @@ class FixedLagSmoother {
 
   /// theta <- x of the variables that moved more than the threshold.
   void move_linearisation_points(const Options& options) {
-    window_.for_each_variable([&]<class V>(VariableRecord<V>& r, int id) {
+    for (int id : tables().living_variables) {
       VariableInfo& info = window_.info(id);
-      if (info.prior >= 0 && options.prior == PriorLinearisation::first_estimate) return;
-      const Tangent<V> scale = V::linearisation_scale();
-      for (int i = 0; i < V::dof; ++i)
-        if (std::abs(r.delta[i]) > options.relinearise_threshold * scale[i]) info.relinearised = true;
-      if (!info.relinearised) return;
-      r.theta = r.candidate = r.x;
-      r.delta.setZero();
-      r.candidate_delta.setZero();  // a local variable without factors gets no step: its candidate stays here
+      if (info.prior >= 0 && options.prior == PriorLinearisation::first_estimate) continue;
+      Scalar* const delta = tables().delta.data() + info.tangent;
+      const Scalar* const scale = tables().scale.data() + info.tangent;
+      for (int i = 0; i < info.dof; ++i)
+        if (std::abs(delta[i]) > options.relinearise_threshold * scale[i]) info.relinearised = true;
+      if (!info.relinearised) continue;
+      window_.assign(id, Which::theta, Which::estimate);
+      window_.assign(id, Which::candidate, Which::estimate);
+      std::fill_n(delta, info.dof, Scalar(0));
+      std::fill_n(tables().candidate_delta.data() + info.tangent, info.dof, Scalar(0));  // a local variable without factors gets no step
       if (info.prior >= 0) elimination_.mark_dirty_from(prior_front());
-    });
+    }
   }
 
   /// Rows and Jacobians of the factors whose variables' theta moved; weights that changed by more than the threshold.
   void linearise_factors(Scalar weight_threshold) {
-    const typename WindowType::template Values<Which::theta> values{window_};
-    window_.for_each_factor([&]<class F>(FactorRecord<F>& r, int) {
-      if (!window_.template enabled<F>()) return;
-      bool moved = !r.linearised;
-      for (int k = 0; k < r.keys; ++k) moved = moved || window_.info(r.variables[static_cast<std::size_t>(k)]).relinearised;
-      if (moved) {
-        r.jacobian.fill(0);
-        r.factor.linearise(values, r.e_theta.data(), JacobianRef<Scalar>{r.jacobian.data(), F::max_rows});
-        r.linearised = true;
-      }
+    for (int id : tables().living_factors) {
+      FactorInfo& f = tables().factor(id);
+      if (!tables().enabled(f)) continue;
+      bool moved = !f.linearised;
+      for (int k = 0; k < f.keys; ++k) moved = moved || window_.info(tables().variables_of(f)[k]).relinearised;
+      if (moved) window_.linearise(id), f.linearised = true;
+      Scalar* const weights = tables().weights.data() + f.first_row;
+      const Scalar* const now = tables().weights_now.data() + f.first_row;
       bool reweighted = moved;
-      for (int i = 0; i < r.rows; ++i)
-        reweighted = reweighted || std::abs(r.weights_now[static_cast<std::size_t>(i)] - r.weights[static_cast<std::size_t>(i)]) > weight_threshold;
-      if (!reweighted) return;
-      r.weights = r.weights_now;
-      elimination_.mark_dirty_from(r.front);
-    });
-    window_.for_each_variable([&](auto&, int id) { window_.info(id).relinearised = false; });
+      for (int i = 0; i < f.rows; ++i) reweighted = reweighted || std::abs(now[i] - weights[i]) > weight_threshold;
+      if (!reweighted) continue;
+      std::copy_n(now, f.rows, weights);
+      elimination_.mark_dirty_from(f.front);
+    }
+    for (int id : tables().living_variables) window_.info(id).relinearised = false;
+  }
+
+  [[nodiscard]] EliminationFailure<Scalar> factorise(Scalar damping, math::ZeroPivot policy = math::ZeroPivot::fail, int only = -1) {
+    (void)prior_.evaluate(window_, Which::theta);
+    return elimination_.factorise(tables(), prior_, damping, policy, only);
+  }
+
+  /// The step of the present factorisation: candidate_delta and candidate = theta (+) candidate_delta.
+  void solve() {
+    elimination_.solve(tables());
+    for (int id : tables().living_variables) {
+      const VariableInfo& info = window_.info(id);
+      if (info.role != Role::local || info.first_factor >= 0) window_.retract(id);
+    }
   }
 
   [[nodiscard]] int prior_front() const {
@@ -323,52 +342,73 @@ class FixedLagSmoother {
 
   [[nodiscard]] bool ensure_analysis() {
     if (!changed_) return true;
-    changed_ = !elimination_.analyse(window_, prior_);
+    changed_ = !elimination_.analyse(tables(), prior_);
     return !changed_;
   }
 
   /// A current, undamped factorisation of the present linearisation.
   Status ensure_factor() {
     bool pending = false;
-    window_.for_each_factor([&]<class F>(FactorRecord<F>& r, int) { pending = pending || (window_.template enabled<F>() && !r.linearised); });
+    for (int id : tables().living_factors) {
+      const FactorInfo& f = tables().factor(id);
+      pending = pending || (tables().enabled(f) && !f.linearised);
+    }
     if (pending) {
-      (void)evaluate<Which::estimate>();
+      (void)evaluate(Which::estimate);
       linearise_factors(0);  // theta stays: whether a variable may move is for optimise() to say
     }
     if (damped_) elimination_.mark_dirty_from(0), damped_ = false;
-    const auto failed = elimination_.factorise(window_, prior_, Scalar(0));
+    const auto failed = factorise(0);
     UnderDetermined where;
     return failed.ok() ? ok_status() : describe(failed, where);
   }
 
   [[nodiscard]] Scalar largest_step() {
     Scalar largest = 0;
-    window_.for_each_variable([&]<class V>(VariableRecord<V>& r, int) {
-      const Tangent<V> scale = V::linearisation_scale();
-      for (int i = 0; i < V::dof; ++i) largest = std::max(largest, std::abs(r.candidate_delta[i] - r.delta[i]) / scale[i]);
-    });
+    for (int id : tables().living_variables)
+      for (int i = 0; i < window_.info(id).dof; ++i) {
+        const std::size_t at = static_cast<std::size_t>(window_.info(id).tangent + i);
+        largest = std::max(largest, std::abs(tables().candidate_delta[at] - tables().delta[at]) / tables().scale[at]);
+      }
     return largest;
   }
 
+  /// to <- from of a tangent table, for a variable.
+  static void copy_tangent(const VariableInfo& info, auto& to, const auto& from) {
+    std::copy_n(from.data() + info.tangent, info.dof, to.data() + info.tangent);
+  }
+
   void accept() {
-    window_.for_each_variable([](auto& r, int) { r.x = r.candidate, r.delta = r.candidate_delta; });
+    for (int id : tables().living_variables) {
+      window_.assign(id, Which::estimate, Which::candidate);
+      copy_tangent(window_.info(id), tables().delta, tables().candidate_delta);
+    }
+    for (int id : tables().living_factors) {  // rows at the candidate are rows at the estimate from here on
+      FactorInfo& f = tables().factor(id);
+      f.evaluated = tables().enabled(f);
+    }
   }
   void save() {
-    window_.for_each_variable([](auto& r, int) {
-      r.saved_x = r.x, r.saved_theta = r.theta, r.saved_delta = r.delta;
-      r.candidate = r.x, r.candidate_delta = r.delta;
-    });
+    for (int id : tables().living_variables) {
+      window_.assign(id, Which::saved_estimate, Which::estimate);
+      window_.assign(id, Which::saved_theta, Which::theta);
+      window_.assign(id, Which::candidate, Which::estimate);
+      copy_tangent(window_.info(id), tables().saved_delta, tables().delta);
+      copy_tangent(window_.info(id), tables().candidate_delta, tables().delta);
+    }
   }
 
   /// Restores what optimise() found and reports why.
   Report give_up(Report report, const Status& status) {
-    window_.for_each_variable([&](auto& r, int id) {
-      r.x = r.saved_x, r.theta = r.saved_theta, r.delta = r.saved_delta;
+    for (int id : tables().living_variables) {
+      window_.assign(id, Which::estimate, Which::saved_estimate);
+      window_.assign(id, Which::theta, Which::saved_theta);
+      copy_tangent(window_.info(id), tables().delta, tables().saved_delta);
       window_.info(id).relinearised = true;  // the factors may hold another linearisation
-    });
-    window_.for_each_factor([](auto& r, int) { r.linearised = false; });
+    }
+    for (int id : tables().living_factors) tables().factor(id).linearised = tables().factor(id).evaluated = false;
     elimination_.mark_dirty_from(0);
-    (void)evaluate<Which::estimate>();  // rows and weights are those of the estimate again
+    (void)evaluate(Which::estimate);  // rows and weights are those of the estimate again
     report.status = status;
     report.final_cost = report.initial_cost;
     return report;
@@ -387,15 +427,14 @@ class FixedLagSmoother {
     where.axis = failed.axis;
     where.pivot = static_cast<double>(failed.pivot);
     where.factor_count = window_.info(failed.variable).degree;
-    window_.visit_variable(failed.variable, [&]<class V>(VariableRecord<V>&) { where.variable_name = V::name, where.axis_name = V::axis_name(failed.axis); });
-    window_.for_each_factor([&]<class F>(FactorRecord<F>& r, int) {
-      for (int k = 0; k < r.keys; ++k)
-        if (r.variables[static_cast<std::size_t>(k)] == failed.variable) {
-          bool known = false;
-          for (const char* n : where.factor_names) known = known || n == F::name;
-          if (!known) (void)where.factor_names.push_back(F::name);
-        }
-    });
+    where.variable_name = window_.variable_name(failed.variable), where.axis_name = window_.axis_name(failed.variable, failed.axis);
+    for (int id : tables().living_factors) {
+      const FactorInfo& f = tables().factor(id);
+      const int* const ids = tables().variables_of(f);
+      if (std::find(ids, ids + f.keys, failed.variable) == ids + f.keys) continue;
+      const char* const name = window_.factor_name(id);
+      if (std::find(where.factor_names.begin(), where.factor_names.end(), name) == where.factor_names.end()) (void)where.factor_names.push_back(name);
+    }
     return failure(StatusCode::under_determined, "the window says nothing about an axis of a variable: see OptimiseReport::where", failed.variable, failed.axis,
                    static_cast<double>(failed.pivot));
   }
@@ -463,12 +502,7 @@ class FixedLagSmoother {
     }
     report.skipped_axes = zero_pivots(front);
     prior_.clear(window_);
-    int gone = 0;
-    window_.for_each_factor([&](auto& r, int id) {
-      if (r.front == 0) doomed_[static_cast<std::size_t>(gone++)] = id;
-    });
-    for (int i = 0; i < gone; ++i) window_.erase_factor(doomed_[static_cast<std::size_t>(i)]);
-    report.factors = gone;
+    report.factors = window_.erase_factors([this](int id) { return tables().factor(id).front == 0; });
     for (int l = front.first_local; l >= 0;) {
       const int next = window_.info(l).next;
       window_.erase_variable(l);
@@ -492,7 +526,7 @@ class FixedLagSmoother {
     for (int id : prior_.variables) {
       window_.info(id).prior = row;
       row += window_.info(id).dof;
-      window_.visit_variable(id, [](auto& r) { r.prior_theta = r.theta; });
+      window_.assign(id, Which::prior, Which::theta);
     }
     elimination_.drop_first_front();
     changed_ = true;
@@ -500,18 +534,16 @@ class FixedLagSmoother {
 
   /// Local variables that lost their last factor leave with the state of their time.
   void erase_idle_locals(GpsTime leaving, MarginaliseReport& report) {
-    int idle = 0;
-    window_.for_each_variable([&](auto&, int id) {
+    const int idle = window_.erase_variables([&](int id) {
       const VariableInfo& info = window_.info(id);
-      if (info.role == Role::local && info.degree == 0 && info.stamp <= leaving) row_[static_cast<std::size_t>(idle++)] = id;
+      return info.role == Role::local && info.degree == 0 && info.stamp <= leaving;
     });
-    for (int i = 0; i < idle; ++i) window_.erase_variable(row_[static_cast<std::size_t>(i)]);
     report.unconnected += idle;
     report.variables += idle;
   }
 
   /// Axes of front 0 whose pivot was passed over: nothing is known about them.
-  [[nodiscard]] int zero_pivots(const typename EliminationType::Front& front) const {
+  [[nodiscard]] int zero_pivots(const Front& front) const {
     const Scalar* const L = elimination_.factor_of(0);
     int zero = 0;
     for (int i = 0; i < front.rows_e; ++i) zero += L[static_cast<std::ptrdiff_t>(i) * (front.border() + 1) + i] > 0 ? 0 : 1;
@@ -521,9 +553,8 @@ class FixedLagSmoother {
   WindowType window_{};
   EliminationType elimination_{};
   typename EliminationType::Prior prior_{}, next_prior_{};
-  Covariance<Problem> covariance_{};
-  std::array<int, static_cast<std::size_t>(WindowType::kVariables)> ids_{}, row_{};
-  std::array<int, static_cast<std::size_t>(WindowType::kFactors)> doomed_{};
+  Covariance<EliminationType> covariance_{};
+  std::array<int, static_cast<std::size_t>(WindowType::VariableTypes::total)> ids_{}, row_{};
   bool changed_{true};
   bool damped_{false};  ///< the stored fronts contain damping
 };

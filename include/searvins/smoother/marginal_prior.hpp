@@ -2,7 +2,7 @@
 /// \file
 /// The marginal prior: what the window remembers of everything that has left it.
 ///
-/// A quadratic on the tangent space of the remaining variables at a fixed point x0 (VariableRecord::prior_theta):
+/// A quadratic on the tangent space of the remaining variables at a fixed point x0 (Which::prior):
 ///
 ///     cost(x) = c + g' d + 1/2 d' H d,        d = x (-) x0
 ///     gradient at theta:  g + H (theta (-) x0)
@@ -36,19 +36,36 @@ struct MarginalPrior {
     return H[static_cast<std::size_t>(column) * static_cast<std::size_t>(dimension) + static_cast<std::size_t>(row)];
   }
 
-  /// Fills d and Hd for the variables' values `W` and returns the cost there.
-  template <Which W, class WindowType>
-  Scalar evaluate(WindowType& window) {
+  /// Fills d and Hd for the variables' values `which` and returns the cost there.
+  template <class WindowType>
+  Scalar evaluate(WindowType& window, Which which) {
     if (empty()) return 0;
-    for (int id : variables) {
-      const int row = window.info(id).prior;
-      window.visit_variable(id, [&]<class V>(VariableRecord<V>& r) {
-        const V& at = W == Which::theta ? r.theta : W == Which::candidate ? r.candidate : r.x;
-        const Tangent<V> step = r.prior_theta.local(at);
-        for (int i = 0; i < V::dof; ++i) d[static_cast<std::size_t>(row + i)] = step[i];
-      });
-    }
-    const auto at = [](int i) { return static_cast<std::size_t>(i); };
+    for (int id : variables) window.local(id, Which::prior, which, d.data() + window.info(id).prior);
+    return cost_at_d();
+  }
+
+  /// Moves the expansion point to theta: g and c there, x0 = theta. Exact on vector spaces, first order on curved ones.
+  template <class WindowType>
+  void move_to_theta(WindowType& window) {
+    if (empty()) return;
+    c = evaluate(window, Which::theta);
+    for (int i = 0; i < dimension; ++i) g[at(i)] += Hd[at(i)];
+    for (int id : variables) window.assign(id, Which::prior, Which::theta);
+  }
+
+  template <class WindowType>
+  void clear(WindowType& window) {
+    for (int id : variables) window.info(id).prior = -1;
+    variables.clear();
+    dimension = 0;
+    c = 0;
+  }
+
+ private:
+  static constexpr std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+  /// Fills Hd.
+  Scalar cost_at_d() {
     for (int i = 0; i < dimension; ++i) Hd[at(i)] = 0;
     for (int j = 0; j < dimension; ++j) {
       const Scalar dj = d[at(j)];
@@ -62,23 +79,6 @@ struct MarginalPrior {
     Scalar cost = c;
     for (int i = 0; i < dimension; ++i) cost += d[at(i)] * (g[at(i)] + Hd[at(i)] / 2);
     return cost;
-  }
-
-  /// Moves the expansion point to theta: g and c there, x0 = theta. Exact on vector spaces, first order on curved ones.
-  template <class WindowType>
-  void move_to_theta(WindowType& window) {
-    if (empty()) return;
-    c = evaluate<Which::theta>(window);
-    for (int i = 0; i < dimension; ++i) g[static_cast<std::size_t>(i)] += Hd[static_cast<std::size_t>(i)];
-    for (int id : variables) window.visit_variable(id, [](auto& r) { r.prior_theta = r.theta; });
-  }
-
-  template <class WindowType>
-  void clear(WindowType& window) {
-    for (int id : variables) window.info(id).prior = -1;
-    variables.clear();
-    dimension = 0;
-    c = 0;
   }
 };
 
