@@ -71,6 +71,11 @@ const Flip kFlips[] = {
     {"fix_memory", [](RtkOptions& o) { o.fix_memory = estimator::FixMemory::epoch; }},
     {"release_sigmas", [](RtkOptions& o) { o.release_sigmas = 0.5; }},
     {"max_suspect_share", [](RtkOptions& o) { o.max_suspect_share = -1; }},
+    {"code_correlation_s", [](RtkOptions& o) { o.code_correlation_s = 1; }},
+    {"code_correlation_m", [](RtkOptions& o) { o.code_correlation_m = 1; }},
+    {"code_noise.on", [](RtkOptions& o) { o.code_noise.on = false; }},
+    {"code_noise.max_scale", [](RtkOptions& o) { o.code_noise.max_scale = 1.05; }},
+    {"code_noise.memory_epochs", [](RtkOptions& o) { o.code_noise.memory_epochs = 2; }},
     {"use_phase", [](RtkOptions& o) { o.use_phase = false; }},
     {"use_doppler", [](RtkOptions& o) { o.use_doppler = false; }},
     {"lag_s", [](RtkOptions& o) { o.lag_s = 10; }},
@@ -125,6 +130,19 @@ TEST_CASE("P12 every settings field changes some output") {
     CAPTURE(name);
     const bool changed = outputs(d, options) != reference;
     CHECK(changed);
+  }
+  RtkOptions alone, alone_and_wary;  // below 1 the noise scale counts in instantaneous mode only
+  alone.continuity = alone_and_wary.continuity = ambiguity::ContinuityMode::instantaneous;
+  alone_and_wary.code_noise.min_scale = alone_and_wary.phase_noise.min_scale = 1;
+  CHECK(outputs(d, alone) != outputs(d, alone_and_wary));
+  RtkOptions noisy;  // phases noisier than assumed
+  noisy.differencing.sigmas.other.phase = {1e-3, 1e-3};
+  const std::vector<double> learned = outputs(d, noisy);
+  for (void (*change)(estimator::NoiseAdaptation&) : {+[](estimator::NoiseAdaptation& n) { n.on = false; }, +[](estimator::NoiseAdaptation& n) { n.max_scale = 1.05; },
+                                                      +[](estimator::NoiseAdaptation& n) { n.memory_epochs = 2; }}) {
+    RtkOptions options = noisy;
+    change(options.phase_noise);
+    CHECK(outputs(d, options) != learned);
   }
   RtkOptions lazy, lazier;  // weights are kept only where the linearisation is
   lazy.solver.relinearise_threshold = lazier.solver.relinearise_threshold = 100;

@@ -18,7 +18,7 @@
 ///
 ///     success rate    P_B > 0.86
 ///     norm            (z - a)' Q_aa^-1 (z - a) <= chi-square quantile: the integers agree with the float's own covariance
-///     ratio           second best over best squared norm
+///     ratio           second best over best squared norm, with a higher bound for a subset
 ///     covariance      horizontal and vertical sigma after fixing small enough
 ///     innovation      dp' (Q_pa Q_aa^-1 Q_ap)^-1 dp <= 16.27 (99.9 % of chi-square 3), and dp not larger than a bound in metres
 ///
@@ -72,7 +72,8 @@ enum class ResolutionVerdict : std::uint8_t {
 struct ResolutionOptions {
   ResolutionMode mode{ResolutionMode::partial};
   double min_success_rate{0.86};
-  double min_ratio{1.5};                ///< second over best squared norm; 1 switches the test off
+  double min_ratio{2};                  ///< second over best squared norm; 1 switches the test off
+  double min_ratio_partial{3};          ///< the same for a subset: it was chosen for agreeing with its integers, so it must do so more clearly
   double norm_confidence{0.9999};       ///< of the chi-square bound on the best squared norm
   int min_ambiguities{5};
   double max_sigma_horizontal_m{0.15};  ///< after fixing, larger axis
@@ -158,7 +159,8 @@ class Resolver {
     if (!condition(f, out)) return ResolutionVerdict::ill_conditioned;
     const auto bound = math::chi_square_quantile(options.norm_confidence, m_);
     if (bound.ok() && out.squared_norm > *bound) return ResolutionVerdict::norm;
-    if (out.ratio < options.min_ratio) return ResolutionVerdict::ratio;
+    const double least_ratio = m_ < f.n ? std::max(options.min_ratio, options.min_ratio_partial) : options.min_ratio;
+    if (out.ratio < least_ratio) return ResolutionVerdict::ratio;
     return judge_position(f, options, out);
   }
 

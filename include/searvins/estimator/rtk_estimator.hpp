@@ -52,6 +52,9 @@ class RtkEstimator {
       : options_(options), code_phase_form_(code_phase), doppler_form_(doppler), tracker_(options.tracker) {
     continuation_.mode = options.continuity;
     continuation_.max_arc_epochs = options.arc_epochs;
+    if (is_instantaneous()) return;
+    options_.code_noise.min_scale = std::max(1.0, options.code_noise.min_scale);
+    options_.phase_noise.min_scale = std::max(1.0, options.phase_noise.min_scale);
   }
 
   /// Broadcast records. Errors: capacity_exceeded.
@@ -214,6 +217,7 @@ class RtkEstimator {
     start.p_wa_m = frame_.to_local(start_e_m);
     start.v_wa_mps = frame_.R_ew.transpose() * predicted_v_e_mps_;
     if (window_running()) start.a_wa_mps2 = smoother_.find(nodes_.back().state)->a_wa_mps2;
+    if (is_instantaneous()) restart();  // an epoch stands for itself: nothing of earlier codes reaches it through the motion
     while (nodes_.full()) marginalise_oldest();
     const auto state = smoother_.add_variable(start, out.time);
     if (!state.ok()) {
@@ -226,37 +230,49 @@ class RtkEstimator {
       add(gnss::PvaPriorFactor{*state, start, options_.start_sigma_m, options_.start_velocity_sigma_mps, options_.start_acceleration_sigma_mps2}, out);
     (void)nodes_.push_back({*state, out.time, SolutionStatus::dr});
     code_keys_.clear(), phase_keys_.clear(), differences_.clear();
-    code_variance_factor_ = code_scale2_;
+    code_variance_factor_ = code_noise_.variance_factor(), phase_variance_factor_ = phase_noise_.variance_factor();
     code_information_share_ = 1 / correlation_factor(out);
     for (int g = 0; g < static_cast<int>(epoch_.groups.size()); ++g) add_group(g, *state, start_e_m, out);
     if (options_.use_doppler) add_doppler(*state, out);
     return true;
   }
 
-  /// n epochs within the correlation time of code errors are worth one, so each counts for 1/n. Instantaneous ambiguities do not add epochs up.
+  [[nodiscard]] bool is_instantaneous() const { return options_.continuity == ambiguity::ContinuityMode::instantaneous; }
+
+  /// n epochs within the correlation time of code errors are worth one, so each counts for 1/n.
   [[nodiscard]] double correlation_factor(const RtkSolution& out) const {
-    if (options_.continuity == ambiguity::ContinuityMode::instantaneous) return 1;
+    if (is_instantaneous()) return 1;
     const double interval_s = nodes_.size() < 2 ? 1.0 : seconds_between(nodes_[nodes_.size() - 2].time, out.time);
-    return std::max(1.0, options_.code_correlation_s / std::max(0.05, interval_s));
+    const double speed_mps = std::max(1e-3, predicted_v_e_mps_.norm());
+    const double correlation_s = std::min(options_.code_correlation_s, options_.code_correlation_m / speed_mps);
+    return std::max(1.0, correlation_s / std::max(0.05, interval_s));
   }
 
-  /// Learns the receiver's code noise: the median of this epoch's whitened code residuals squared is 0.455 when the variances are right.
+  /// Learns the code noise of the receivers from the codes of this epoch: they determine the position and each batch's latent pivot error.
   void learn_code_noise() {
-    if (!options_.adapt_code_noise) return;
-    StaticVector<double, gnss::kMaxCorrectedSignals> squares;
-    for (const auto& key : code_keys_) {
+    code_noise_.begin();
+    code_noise_.add_parameters(3);
+    add_residuals(code_keys_, code_noise_);
+    code_noise_.finish(options_.code_noise);
+  }
+
+  /// Learns the phase noise from the phases of a fixed epoch: those without an integer determine their ambiguity and nothing else.
+  void learn_phase_noise(const RtkSolution& out) {
+    phase_noise_.begin();
+    phase_noise_.add_parameters(3 + out.phases - out.fixed_phases);
+    add_residuals(phase_keys_, phase_noise_);
+    phase_noise_.finish(options_.phase_noise);
+  }
+
+  template <class Keys, class Noise>
+  void add_residuals(const Keys& keys, Noise& noise) {
+    for (const auto& key : keys) {
       const double* e = smoother_.whitened_rows(key);
+      if (!e) continue;
       const auto* f = smoother_.find_factor(key);
-      for (int i = 0; e && i < f->size(); ++i) (void)squares.push_back(e[i] * e[i]);
+      for (int i = 0; i < f->rows(); ++i) noise.add(e[i]);
+      noise.add_parameters(f->rows() - f->size());
     }
-    if (squares.size() < 8) return;
-    const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-    std::nth_element(squares.begin(), middle, squares.end());
-    constexpr double median_of_chi_square_1 = 0.454936;
-    const double seen2 = code_scale2_ * *middle / median_of_chi_square_1;
-    const double low = options_.min_code_scale, high = options_.max_code_scale;
-    code_scale_count_ = std::min(code_scale_count_ + 1, std::max(1, options_.code_scale_memory));
-    code_scale2_ += (std::clamp(seen2, low * low, high * high) - code_scale2_) / (code_scale_count_ + 1);
   }
 
   template <class F>
@@ -379,7 +395,7 @@ class RtkEstimator {
       const gnss::CorrectedSignal& s = epoch_.signals[at(i)];
       const AmbiguityKey key = ambiguity_state(i, pivot, reference_m, start_e_m, out);
       if (!key.valid()) return;
-      variances[phase.candidates.size()] = s.phase_variance_m2;
+      variances[phase.candidates.size()] = s.phase_variance_m2 * phase_variance_factor_;
       (void)phase.candidates.push_back({s.satellite_e_m, s.phase_m});
       (void)phase.ambiguities.push_back(key);
       (void)differences_.push_back({key, phase.pivot_ambiguity, arc_of(s)});
@@ -387,7 +403,7 @@ class RtkEstimator {
     add_candidate(group.pivot);
     for (std::uint16_t c : group.candidates) add_candidate(c);
     out.phases += phase.size();
-    finish_batch(phase, variances.data(), epoch_.signals[at(pivot)].phase_variance_m2, code_phase_form_, out, phase_keys_);
+    finish_batch(phase, variances.data(), epoch_.signals[at(pivot)].phase_variance_m2 * phase_variance_factor_, code_phase_form_, out, phase_keys_);
   }
 
   template <class F>
@@ -409,7 +425,7 @@ class RtkEstimator {
     factor.covariance = *covariance;
     factor.formulation = form;
     if constexpr (Form::has_latent) {
-      const typename Smoother::WindowType::template Values<smoother::Which::estimate> values{smoother_.window()};
+      const typename Smoother::WindowType::Values values = smoother_.window().values(smoother::Which::estimate);
       gnss::PivotError start;
       start.value = factor.initial_latent(values);
       const auto latent = smoother_.add_variable(start, out.time);
@@ -509,13 +525,14 @@ class RtkEstimator {
     if (!held_.empty()) {
       smoother_.template set_enabled<gnss::IntegerFix>(true);
       if (!optimise(out)) return recover(out);
+      if (!fresh.empty()) learn_phase_noise(out);
       if (!fresh.empty() && is_suspect()) take_back(fresh, out);
     }
     if (out.verdict == ambiguity::ResolutionVerdict::accepted) out.status = SolutionStatus::fix;
     write(out);
     if (options_.fix_memory == FixMemory::epoch) release_all();
     out.held_integers = static_cast<int>(held_.size());
-    out.code_scale = std::sqrt(code_scale2_);
+    out.code_scale = std::sqrt(code_noise_.variance_factor()), out.phase_scale = std::sqrt(phase_noise_.variance_factor());
     learn_code_noise();
     watch_divergence(out);
   }
@@ -648,13 +665,19 @@ class RtkEstimator {
     held_.erase_if([this](const Held& h) { return smoother_.find_factor(h.factor) == nullptr; });
   }
 
-  /// Whether the re-optimised window fights the integers: too many phases of this epoch lost their weight.
+  /// Whether the re-optimised window fights the integers: too many phases of this epoch would lose their weight even if phases were as noisy as the
+  /// adaptation allows.
   [[nodiscard]] bool is_suspect() {
+    const double used = std::sqrt(phase_variance_factor_), noisiest = options_.phase_noise.on ? std::max(used, options_.phase_noise.max_scale) : used;
     int low = 0, all = 0;
     for (const auto& key : phase_keys_) {
-      const double* w = smoother_.weights(key);
+      const double* e = smoother_.whitened_rows(key);
+      if (!e) continue;
       const auto* f = smoother_.find_factor(key);
-      for (int i = 0; w && i < f->size(); ++i) ++all, low += w[i] < 0.5 ? 1 : 0;
+      std::array<double, static_cast<std::size_t>(Problem::PhaseFactor::max_rows)> rows{}, w{};
+      for (int i = 0; i < f->rows(); ++i) rows[at(i)] = e[i] * used / noisiest;
+      (void)f->weigh(rows.data(), w.data());
+      for (int i = 0; i < f->size(); ++i) ++all, low += w[at(i)] < 0.5 ? 1 : 0;
     }
     return all > 0 && low > options_.max_suspect_share * all;
   }
@@ -739,9 +762,9 @@ class RtkEstimator {
   GpsTime last_tag_{};
   bool started_{false};
   int suspect_epochs_{0};
-  double code_scale2_{1}, code_variance_factor_{1};  ///< learned scale on code variances; the one in use
+  NoiseScale<2 * gnss::kMaxCorrectedSignals> code_noise_{}, phase_noise_{};
+  double code_variance_factor_{1}, phase_variance_factor_{1};  ///< of the epoch that is being added
   double code_information_share_{1};
-  int code_scale_count_{0};
 };
 
 }  // namespace searvins::estimator

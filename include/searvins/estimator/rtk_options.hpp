@@ -8,6 +8,7 @@
 
 #include <searvins/ambiguity/continuation.hpp>
 #include <searvins/ambiguity/resolution.hpp>
+#include <searvins/estimator/noise_scale.hpp>
 #include <searvins/gnss/double_difference.hpp>
 #include <searvins/gnss/single_point_tracker.hpp>
 #include <searvins/smoother/optimise.hpp>
@@ -26,11 +27,11 @@ enum class FixMemory : std::uint8_t {
   epoch    ///< only the epoch that accepted it
 };
 
-/// Sigmas of a rover-base single difference that the estimator starts from: codes of a good receiver in the open,
-/// phases with some room for antennas and a few kilometres of atmosphere, Doppler 0.2 m/s.
+/// Sigmas of a rover-base single difference that the estimator starts from: a good receiver in the open, white from epoch to epoch. What a pair of
+/// receivers does beyond that is learned (NoiseAdaptation), what lasts over several epochs is counted once (code_correlation_*).
 [[nodiscard]] inline gnss::SigmaModel default_sigmas() {
   gnss::SigmaModel m;
-  m.other = {{}, {0.5, 0.5}, {0.003, 0.006}};
+  m.other = {{}, {0.3, 0.3}, {0.003, 0.003}};
   m.doppler_mps = 0.2;
   return m;
 }
@@ -49,10 +50,12 @@ struct RtkOptions {
   FixMemory fix_memory{FixMemory::window};
   double release_sigmas{4};             ///< a held integer further than this from the float without it is released
   double max_suspect_share{0.2};        ///< a fix after which more than this share of its phases is down-weighted below 1/2 is taken back
-  double code_correlation_s{8};         ///< codes of one receiver err alike over this time: their variances grow by it over the epoch interval
-  bool adapt_code_noise{false};         ///< scale the code variances by what the residuals of this receiver have shown so far
-  double min_code_scale{0.5}, max_code_scale{4};  ///< bounds of that scale on sigma
-  int code_scale_memory{30};            ///< epochs over which it is averaged
+  double code_correlation_s{8};         ///< codes of one receiver err alike over this time, so that epochs within it are worth one;
+  double code_correlation_m{10};        ///< or over this way of the antenna, whichever ends sooner: reflections change with the place
+  /// Learned factors on the sigmas of codes and, from fixed epochs, phases. Below 1 they count only where ambiguities are instantaneous: residuals of one
+  /// epoch do not show the errors that last over a window.
+  NoiseAdaptation code_noise{.min_scale = 0.3, .max_scale = 1.7};
+  NoiseAdaptation phase_noise{.min_scale = 0.3, .max_scale = 2};
   bool use_phase{true};
   bool use_doppler{true};
   double lag_s{6};                      ///< window length; at least arc_epochs + 1 epochs are kept whatever their interval

@@ -45,7 +45,7 @@ struct RtkSolution {
   ambiguity::ResolutionVerdict verdict{ambiguity::ResolutionVerdict::too_few};
   double success_rate{0}, ratio{0};
   double code_weight{0}, phase_weight{0};  ///< mean robust weights of this epoch's rows, 0 without rows
-  double code_scale{1};     ///< learned factor on the code sigmas
+  double code_scale{1}, phase_scale{1};  ///< learned factors on the sigmas of code and phase
   int held_integers{0};     ///< integer constraints in the window after this epoch
   int released_integers{0};  ///< taken back at this epoch
   int iterations{0};        ///< Gauss-Newton iterations, float and fixed together
