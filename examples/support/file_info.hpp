@@ -2,8 +2,8 @@
 /// \file
 /// What is in an input file, as facts and tables that can be printed for people or as JSON: the content of `searvins info`.
 ///
-/// The sort of a file is told from its content. RINEX files go through the library's own readers, so what is reported as skipped is
-/// what a run would skip; number tables (IMU logs, stereo tracks) are scanned line by line.
+/// The sort of a file is told from its content. RINEX files and IMU logs go through the library's own readers, so what is reported as
+/// skipped is what a run would skip; stereo tracks are scanned line by line.
 #pragma once
 
 #include <algorithm>
@@ -20,6 +20,7 @@
 #include <variant>
 #include <vector>
 
+#include <searvins/io/imu_log.hpp>
 #include <searvins/io/rinex_info.hpp>
 #include <searvins/io/text_fields.hpp>
 
@@ -175,38 +176,20 @@ inline void describe_navigation(const io::NavigationFileInfo& n, FileInfo& info)
   info.tables.push_back(messages);
 }
 
-/// How the rows of a number table tell their time.
-struct TableTime {
-  std::size_t week{SIZE_MAX}, seconds{SIZE_MAX}, fraction{SIZE_MAX}, nanoseconds{SIZE_MAX};
-
-  [[nodiscard]] static TableTime of_header(const std::vector<std::string_view>& names) {
-    TableTime time;
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      const std::string name = plain_name(names[i]);
-      if (name == "week" || name == "gps_week") time.week = i;
-      if (time.seconds == SIZE_MAX && (name == "t" || name == "sow" || name == "tow_s" || name == "t_gps_sow")) time.seconds = i;
-      if (name == "timestamp_ns" || name == "timestamp") time.nanoseconds = i;
-    }
-    return time;
+/// Which column of a table has the time in seconds; SIZE_MAX: none.
+[[nodiscard]] inline std::size_t time_column(const std::vector<std::string_view>& names) {
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string name = plain_name(names[i]);
+    if (name == "t" || name == "sow" || name == "tow_s" || name == "t_gps_sow") return i;
   }
-  /// Seconds of the row on the file's own scale; NaN when a field is no number.
-  [[nodiscard]] double seconds_of(const std::vector<double>& v) const {
-    const auto at = [&v](std::size_t i) { return i < v.size() ? v[i] : 0.0; };
-    if (nanoseconds != SIZE_MAX) return at(nanoseconds) * 1e-9;
-    if (seconds == SIZE_MAX) return io::kUnknown;
-    return at(week) * static_cast<double>(kSecondsPerWeek) + at(seconds) + at(fraction);
-  }
-};
+  return SIZE_MAX;
+}
 
-/// Scans a comma-separated table of numbers: rows, bad rows, time span, interval, gaps; for tracks their number too.
-inline void describe_table(std::string_view text, io::FileKind kind, FileInfo& info) {
+/// Scans stereo tracks: rows, bad rows, time span, interval, gaps, frames, tracks.
+inline void describe_tracks(std::string_view text, FileInfo& info) {
   io::LineReader lines{text};
   std::string_view line;
-  TableTime time;
-  if (kind == io::FileKind::lord_log)
-    time = {0, 1, 2, SIZE_MAX};
-  else
-    time.seconds = 0;
+  std::size_t time = 0;
   long rows = 0, columns = 0;
   io::SkipLog skipped;
   double first = io::kUnknown, last = io::kUnknown;
@@ -222,8 +205,8 @@ inline void describe_table(std::string_view text, io::FileKind kind, FileInfo& i
     bool numeric = !comment;
     for (std::size_t i = 0; numeric && i < fields.size(); ++i) numeric = io::parse_number(fields[i], values[i]);
     if (!numeric) {
-      if (rows == 0 && kind != io::FileKind::lord_log && fields.size() > 2)
-        time = TableTime::of_header(fields);
+      if (rows == 0 && fields.size() > 2)
+        time = time_column(fields);
       else if (!comment)
         skipped.add("not a row of numbers", lines.number());
       continue;
@@ -233,7 +216,7 @@ inline void describe_table(std::string_view text, io::FileKind kind, FileInfo& i
       skipped.add("wrong number of fields", lines.number());
       continue;
     }
-    const double t = time.seconds_of(values);
+    const double t = time < values.size() ? values[time] : io::kUnknown;
     if (rows > 0 && t < last) skipped.add("time falls back", lines.number());
     if (rows == 0)
       first = t;
@@ -241,7 +224,7 @@ inline void describe_table(std::string_view text, io::FileKind kind, FileInfo& i
       steps.push_back(t - last);
     last = t;
     ++rows;
-    if (kind == io::FileKind::stereo_tracks && values.size() > 1) tracks.insert(static_cast<long long>(std::clamp(values[1], -9e15, 9e15)));
+    if (values.size() > 1) tracks.insert(static_cast<long long>(std::clamp(values[1], -9e15, 9e15)));
   }
   info.facts.push_back({"rows", {rows}});
   info.facts.push_back({"columns", {columns}});
@@ -251,11 +234,44 @@ inline void describe_table(std::string_view text, io::FileKind kind, FileInfo& i
   info.facts.push_back({"interval_s", {interval_s, 4}});
   info.facts.push_back(
       {"gaps", {static_cast<long>(std::count_if(steps.begin(), steps.end(), [interval_s](double s) { return s > 1.5 * interval_s; }))}});
-  if (kind == io::FileKind::stereo_tracks) {
-    info.facts.push_back({"frames", {static_cast<long>(steps.size()) + (rows > 0 ? 1 : 0)}});
-    info.facts.push_back({"tracks", {static_cast<long>(tracks.size())}});
-  }
+  info.facts.push_back({"frames", {static_cast<long>(steps.size()) + (rows > 0 ? 1 : 0)}});
+  info.facts.push_back({"tracks", {static_cast<long>(tracks.size())}});
   info.skipped = skipped.items();
+}
+
+/// An IMU log: rate, span, gaps, what it measures on average, and what looks wrong with it.
+inline void describe_imu_log(const std::string& path, FileInfo& info) {
+  io::Parsed<io::ImuLog> log = io::read_imu_log(path);
+  info.error = log.error;
+  info.skipped = log.skipped.items();
+  if (log.error) return;
+  const std::vector<imu::ImuSample>& samples = log.value.samples;
+  info.facts.push_back({"rows", {static_cast<long>(samples.size())}});
+  if (log.value.has_week) {
+    add_span(info, samples.front().time, samples.back().time);
+  } else {
+    info.facts.push_back({"first_sow", {samples.front().time.sow()}});
+    info.facts.push_back({"last_sow", {samples.back().time.sow()}});
+    info.facts.push_back({"duration_s", {seconds_between(samples.front().time, samples.back().time)}});
+  }
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero(), gyro = Eigen::Vector3d::Zero();
+  double accel_norm = 0;
+  const double n = static_cast<double>(samples.size());
+  for (const imu::ImuSample& s : samples) accel += s.accel_b_mps2 / n, gyro += s.gyro_b_radps / n, accel_norm += s.accel_b_mps2.norm() / n;
+  info.facts.push_back({"interval_s", {log.value.interval_s, 4}});
+  const double duration_s = seconds_between(samples.front().time, samples.back().time);
+  info.facts.push_back({"rate_hz", {duration_s > 0 ? (n - 1) / duration_s : io::kUnknown, 2}});
+  info.facts.push_back({"gaps", {log.value.gap_count}});
+  info.facts.push_back({"mean_accel_norm_mps2", {accel_norm, 4}});
+  add_vector(info, "mean_accel_mps2", accel);
+  add_vector(info, "mean_gyro_radps", gyro);
+  info.facts.push_back({"up_axis", {io::detail::axis_name(accel)}});
+  InfoTable gaps{"gap_list", {"from_sow", "to_sow", "length_s"}, {}};
+  for (const io::ImuGap& gap : log.value.gaps) gaps.rows.push_back({{gap.from.sow()}, {gap.to.sow()}, {seconds_between(gap.from, gap.to)}});
+  if (!gaps.rows.empty()) info.tables.push_back(gaps);
+  InfoTable findings{"findings", {"finding", "what_to_do"}, {}};
+  for (const io::ImuFinding& f : log.value.findings) findings.rows.push_back({{f.text.message}, {f.text.hint}});
+  if (!findings.rows.empty()) info.tables.push_back(findings);
 }
 
 inline void describe_trajectory(const std::string& path, FileInfo& info) {
@@ -331,6 +347,8 @@ inline void describe_json(const std::string& path, FileInfo& info) {
     case io::FileKind::rtklib_pos: return detail::describe_trajectory(path, info), info;
     case io::FileKind::truth: return detail::describe_truth(path, info), info;
     case io::FileKind::json: return detail::describe_json(path, info), info;
+    case io::FileKind::imu_csv:
+    case io::FileKind::lord_log: return detail::describe_imu_log(path, info), info;
     default: break;
   }
   const io::FileResult<std::string> text = io::read_text_file(path);
@@ -344,7 +362,7 @@ inline void describe_json(const std::string& path, FileInfo& info) {
   } else if (sniffed.kind == io::FileKind::rinex_other) {
     info.error = io::Diagnostic{path, 1, "RINEX of a type that is not used: only observations (O) and navigation (N) are", {}};
   } else {
-    detail::describe_table(*text, sniffed.kind, info);
+    detail::describe_tracks(*text, info);
   }
   return info;
 }

@@ -16,6 +16,7 @@
 #include <searvins/core/status.hpp>
 #include <searvins/core/time.hpp>
 
+#include <searvins/estimator/noise_scale.hpp>
 #include <searvins/estimator/rtk_estimator.hpp>
 #include <searvins/estimator/rtk_options.hpp>
 #include <searvins/estimator/rtk_problem.hpp>
@@ -50,6 +51,21 @@
 #include <searvins/gnss/single_point_tracker.hpp>
 #include <searvins/gnss/weighting.hpp>
 
+#include <searvins/imu/alignment.hpp>
+#include <searvins/imu/attitude_angles.hpp>
+#include <searvins/imu/earth.hpp>
+#include <searvins/imu/heading.hpp>
+#include <searvins/imu/imu_factor.hpp>
+#include <searvins/imu/imu_sample.hpp>
+#include <searvins/imu/initializer.hpp>
+#include <searvins/imu/motion_accumulator.hpp>
+#include <searvins/imu/navigation_prior.hpp>
+#include <searvins/imu/navigation_state.hpp>
+#include <searvins/imu/position_fix.hpp>
+#include <searvins/imu/prediction.hpp>
+#include <searvins/imu/preintegrated_motion.hpp>
+#include <searvins/imu/preintegration.hpp>
+
 #include <searvins/math/block_cholesky.hpp>
 #include <searvins/math/quantiles.hpp>
 #include <searvins/math/small_cholesky.hpp>
@@ -63,9 +79,15 @@
 #include <searvins/smoother/elimination.hpp>
 #include <searvins/smoother/factor.hpp>
 #include <searvins/smoother/fixed_lag_smoother.hpp>
+#include <searvins/smoother/front_tree.hpp>
 #include <searvins/smoother/marginal_prior.hpp>
 #include <searvins/smoother/optimise.hpp>
+#include <searvins/smoother/tables.hpp>
 #include <searvins/smoother/variable.hpp>
 #include <searvins/smoother/window.hpp>
+
+#include <searvins/stationary/detector.hpp>
+#include <searvins/stationary/position_anchor.hpp>
+#include <searvins/stationary/stationary_factors.hpp>
 
 #include <searvins/version.hpp>

@@ -47,6 +47,26 @@ TEST_CASE("info: number tables tell rows, span, interval, gaps and bad lines") {
   CHECK(fact(tracks, "tracks") == "2");
 }
 
+TEST_CASE("info: an IMU log tells rate, gaps, gravity, where up is, and what looks wrong with it") {
+  std::string text = "week,sow,gx,gy,gz,ax,ay,az\n";
+  for (int i = 0; i < 50; ++i) text += "2323," + io::fixed_text(100 + 0.02 * (i < 40 ? i : i + 10), 2) + ",0.001,0.002,0,0.01,0.02,-0.998\n";
+  const FileInfo log = info_of(text);
+  CHECK_FALSE(log.error);
+  CHECK(log.kind == "IMU CSV");
+  CHECK(fact(log, "rows") == "50");
+  CHECK(fact(log, "interval_s") == "0.0200");
+  CHECK(fact(log, "gaps") == "1");
+  CHECK(fact(log, "duration_s") == "1.180");
+  CHECK(fact(log, "mean_accel_norm_mps2") == "9.7895");
+  CHECK(fact(log, "up_axis") == "-z");
+  CHECK(fact(log, "first").find("week 2323, sow 100.000") != std::string::npos);
+  REQUIRE(log.tables.size() == 2);
+  CHECK(log.tables[0].rows.size() == 1);
+  CHECK(log.tables[0].rows[0][2].text() == "0.220");
+  CHECK(log.tables[1].rows[0][0].text().find("the unit is g") != std::string::npos);
+  CHECK(info_of("t,gx,gy,gz,ax,ay\n1,2,3,4,5,6\n").error->message.find("az") != std::string::npos);
+}
+
 TEST_CASE("info: what cannot be used is an error with its reason, in both outputs") {
   const FileInfo gzip = info_of("\x1f\x8b\x08 packed");
   REQUIRE(gzip.error);
@@ -94,6 +114,8 @@ TEST_CASE("info: the recordings") {
   CHECK(rover.tables[0].rows.size() == 3);  // GPS, Galileo, QZSS
   const FileInfo imu = file_info((*shared / "data/twin/a-clean/imu.log").string());
   CHECK(fact(imu, "rows") == "114001");
+  CHECK(fact(imu, "rate_hz") == "100.00");
+  CHECK(fact(imu, "up_axis") == "-z");
   CHECK(file_info((*shared / "data/twin/a-clean/rig.json").string()).kind == "rig");
   CHECK(file_info((*shared / "data/twin/a-clean/ground_truth.log").string()).kind == "truth");
 }

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// \file
+/// Dead reckoning: the state at the end of an interval, and its covariance, from the state at its start.
+///
+/// The predicted state is the one at which the motion rows of ImuFactor vanish (notation there), biases held:
+///
+///     R_j = C' R_i dR(b)
+///     d   = C' (T v_i + J2 (g_i + G d/3) + R_i dp(b))                 three passes; each gains a factor |G| T^2, 1e-6 at 1 s
+///     v_j = C' (v_i + J1 (g_i + G d/2) + R_i dv(b)) - K d
+///
+/// To first order, with the errors (phi, n_p, n_v) of the motion and its sensitivities D to the biases (G left out: 1e-6 T^2 of a position
+/// error),
+///
+///     dtheta_j = dR' dtheta_i + D_R db_g + phi
+///     dp_j     = dp_i + C' (T dv_i - R_i [dp]x dtheta_i + R_i (D_p db + n_p))
+///     dv_j     =        C' (dv_i - R_i [dv]x dtheta_i + R_i (D_v db + n_v)) - K (dp_j - dp_i)
+#pragma once
+
+#include <Eigen/Core>
+
+#include <searvins/core/status.hpp>
+#include <searvins/imu/earth.hpp>
+#include <searvins/imu/imu_sample.hpp>
+#include <searvins/imu/navigation_state.hpp>
+#include <searvins/imu/preintegrated_motion.hpp>
+#include <searvins/math/so3.hpp>
+
+namespace searvins::imu {
+
+using NavigationCovariance = Eigen::Matrix<double, 15, 15>;
+
+/// The state at the end of a motion. The motion's first-order bias correction is applied for the biases of `x`.
+template <EarthModel Earth>
+[[nodiscard]] NavigationState predict(const NavigationState& x, const PreintegratedMotion<double>& motion, const Earth& earth) {
+  const double T = motion.duration_s;
+  const GravityField gravity = earth.gravity_field(x.p_wb_m);
+  EarthTurn w = EarthTurn::none(T);
+  if constexpr (Earth::rotates) w = EarthTurn::over(earth.rate_w_radps(), T);
+  const auto m = motion.corrected(bias_of(x));
+  const Eigen::Vector3d g = gravity.gravity_w_mps2, way = T * x.v_wb_mps + x.R_wb * m.dp_m;
+  Eigen::Vector3d d = Eigen::Vector3d::Zero();
+  for (int pass = 0; pass < 3; ++pass) d = w.C.transpose() * (way + w.J2 * (g + gravity.gradient_w_ps2 * d / 3));
+  NavigationState y = x;
+  y.R_wb = w.C.transpose() * x.R_wb * m.dR;
+  y.p_wb_m = x.p_wb_m + d;
+  y.v_wb_mps = w.C.transpose() * (x.v_wb_mps + w.J1 * (g + gravity.gradient_w_ps2 * d / 2) + x.R_wb * m.dv_mps) - w.K * d;
+  return y;
+}
+
+/// Covariance of the predicted state from that of `x` (both in the order of the state's axes, about their own states) and the motion's.
+template <EarthModel Earth>
+[[nodiscard]] NavigationCovariance predict_covariance(const NavigationState& x, const NavigationCovariance& covariance,
+                                                      const PreintegratedMotion<double>& motion, const ImuNoise& noise,
+                                                      const Earth& earth) {
+  using State = NavigationState;
+  using Matrix3 = Eigen::Matrix3d;
+  constexpr int t = State::attitude, p = State::position, v = State::velocity, ba = State::accel_bias, bg = State::gyro_bias;
+  const double T = motion.duration_s;
+  EarthTurn w = EarthTurn::none(T);
+  if constexpr (Earth::rotates) w = EarthTurn::over(earth.rate_w_radps(), T);
+  const auto m = motion.corrected(bias_of(x));
+  const Matrix3 Ct = w.C.transpose(), CtR = Ct * x.R_wb;
+
+  NavigationCovariance F = NavigationCovariance::Identity();
+  F.block<3, 3>(t, t) = m.dR.transpose();
+  F.block<3, 3>(t, bg) = so3::right_jacobian(m.turn_rad) * motion.d_R_d_gyro_bias;
+  F.block<3, 3>(p, t) = -CtR * so3::skew(m.dp_m);
+  F.block<3, 3>(p, v) = T * Ct;
+  F.block<3, 3>(p, ba) = CtR * motion.d_p_d_accel_bias;
+  F.block<3, 3>(p, bg) = CtR * motion.d_p_d_gyro_bias;
+  F.block<3, 3>(v, t) = -CtR * so3::skew(m.dv_mps) - w.K * F.block<3, 3>(p, t);
+  F.block<3, 3>(v, v) = Ct - w.K * F.block<3, 3>(p, v);
+  F.block<3, 3>(v, ba) = CtR * motion.d_v_d_accel_bias - w.K * F.block<3, 3>(p, ba);
+  F.block<3, 3>(v, bg) = CtR * motion.d_v_d_gyro_bias - w.K * F.block<3, 3>(p, bg);
+
+  // The motion's own errors, turned into axes of w at the end.
+  Eigen::Matrix<double, 9, 9> N = Eigen::Matrix<double, 9, 9>::Identity();
+  N.block<3, 3>(p, p) = CtR;
+  N.block<3, 3>(v, p) = -w.K * CtR;
+  N.block<3, 3>(v, v) = CtR;
+
+  const NavigationCovariance FP = F.lazyProduct(covariance);
+  NavigationCovariance Q = FP.lazyProduct(F.transpose());
+  const Eigen::Matrix<double, 9, 9> NQ = N.lazyProduct(motion.covariance);
+  Q.topLeftCorner<9, 9>() += NQ.lazyProduct(N.transpose());
+  const double accel_walk = noise.accel_bias_walk_mps3_sqrt_hz, gyro_walk = noise.gyro_bias_walk_radps2_sqrt_hz;
+  Q.diagonal().segment<3>(ba).array() += accel_walk * accel_walk * T;
+  Q.diagonal().segment<3>(bg).array() += gyro_walk * gyro_walk * T;
+  for (int j = 0; j < 15; ++j)
+    for (int i = 0; i < j; ++i) Q(i, j) = Q(j, i) = (Q(i, j) + Q(j, i)) / 2;
+  return Q;
+}
+
+}  // namespace searvins::imu
