@@ -9,6 +9,7 @@ namespace searvins::examples {
 int run_solve(int argc, const char* const* argv);     ///< recordings -> trajectory, report
 int run_info(int argc, const char* const* argv);      ///< what is in an input file
 int run_evaluate(int argc, const char* const* argv);  ///< scores trajectories against a truth
+int run_simulate(int argc, const char* const* argv);  ///< makes a drive with all its sensors
 int run_demo(int argc, const char* const* argv);      ///< solves the bundled recording
 
 }  // namespace searvins::examples

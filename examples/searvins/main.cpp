@@ -24,6 +24,7 @@ constexpr Command kCommands[] = {
     {"solve", "solves a recording: trajectory, covariance, fix status, report", run_solve},
     {"info", "says what is in an input file", run_info},
     {"evaluate", "scores trajectories against a truth, in the paper's tables", run_evaluate},
+    {"simulate", "makes a drive with GNSS, IMU and stereo tracks, and the truth about it", run_simulate},
     {"demo", "solves a small bundled recording and writes its report", run_demo},
 };
 

@@ -40,6 +40,7 @@ struct Orbit {
   double af0{0}, af1{0};
   double delay_s{0};        ///< TGD; BGD E5b/E1; TGD1
   double other_delay_s{0};  ///< BGD E5a/E1; TGD2
+  int issue_shift{0};       ///< records of one satellite differ by it
 };
 
 /// Gravity constant of the interface document, m^3/s^2.
@@ -82,6 +83,21 @@ struct Orbit {
   char text[32];
   std::snprintf(text, sizeof text, "%.12E", value);
   return std::strtod(text, nullptr);
+}
+
+/// The same orbit and clock with a reference time that lies `later_s` seconds later.
+[[nodiscard]] inline Orbit later_record(const Orbit& orbit, double later_s) {
+  const auto angle = [](double a) { return as_written(std::remainder(a, 2 * std::numbers::pi)); };
+  Orbit o = orbit;
+  const double motion = std::sqrt(gravity_constant(o.system)) / (o.sqrt_a * o.sqrt_a * o.sqrt_a) + o.delta_n;
+  o.toe = o.toe.plus_seconds(later_s), o.toe_since_start_s += later_s;
+  o.toe_of_week_s = std::fmod(o.toe_of_week_s + later_s, 604'800.0);
+  o.m0 = angle(o.m0 + motion * later_s);
+  o.omega0 = angle(o.omega0 + o.omega_dot * later_s - earth_rate(o.system) * (orbit.toe_of_week_s + later_s - o.toe_of_week_s));
+  o.i0 = as_written(o.i0 + o.i_dot * later_s);
+  o.af0 = as_written(o.af0 + o.af1 * later_s);
+  ++o.issue_shift;
+  return o;
 }
 
 /// Planes, slots and size of a constellation.

@@ -50,7 +50,7 @@ inline constexpr double kPhaseLockDbhz = 38;
 struct Measurement {
   const Signal* signal{nullptr};
   double code_m{0}, phase_cycles{0}, doppler_hz{0}, cn0_dbhz{0};
-  bool has_phase{true};
+  bool has_code{true}, has_phase{true};  ///< without a code the signal is not tracked at all
   int lli{0};
 };
 

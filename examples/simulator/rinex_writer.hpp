@@ -33,7 +33,8 @@ namespace searvins::simulator {
   return formatted("%-60s%-20s\n", content.c_str(), label);
 }
 
-[[nodiscard]] inline std::string observation_header(const std::string& marker, const Eigen::Vector3d& near_e_m, GpsTime start) {
+[[nodiscard]] inline std::string observation_header(const std::string& marker, const Eigen::Vector3d& near_e_m, GpsTime start,
+                                                    double interval_s = 1.0) {
   std::string text = header_record(formatted("%9.2f%11s%-20s%s", 3.04, "", "OBSERVATION DATA", "M: MIXED"), "RINEX VERSION / TYPE");
   text += header_record(formatted("%-20s%-20s20250101 000000 UTC", "searvins_make_recor", "synthetic"), "PGM / RUN BY / DATE");
   text += header_record("Simulated: no receiver recorded this", "COMMENT");
@@ -53,7 +54,7 @@ namespace searvins::simulator {
     text += header_record(formatted("%c  %3d", system, count) + types, "SYS / # / OBS TYPES");
   }
   text += header_record("DBHZ", "SIGNAL STRENGTH UNIT");
-  text += header_record(formatted("%10.3f", 1.0), "INTERVAL");
+  text += header_record(formatted("%10.3f", interval_s), "INTERVAL");
   const CivilTime c = civil_from_gps(start);
   text +=
       header_record(formatted("%6d%6d%6d%6d%6d%13.7f     GPS", c.year, c.month, c.day, c.hour, c.minute, c.second), "TIME OF FIRST OBS");
@@ -61,7 +62,7 @@ namespace searvins::simulator {
   return text + header_record("", "END OF HEADER");
 }
 
-/// An epoch with its satellites; every signal of a constellation has its four columns.
+/// An epoch with its satellites; every signal of a constellation has its four columns, blank when it is not tracked.
 [[nodiscard]] inline std::string observation_epoch(const Epoch& epoch, GpsTime start) {
   const CivilTime c = civil_from_gps(start.plus_seconds(epoch.tag_s));
   std::string text = formatted("> %04d %02d %02d %02d %02d%11.7f  0%3d\n", c.year, c.month, c.day, c.hour, c.minute, c.second,
@@ -69,6 +70,10 @@ namespace searvins::simulator {
   for (const SatelliteMeasurements& satellite : epoch.satellites) {
     text += formatted("%c%02d", satellite.system, satellite.number);
     for (const Measurement& m : satellite.signals) {
+      if (!m.has_code) {
+        text += std::string(64, ' ');
+        continue;
+      }
       const int strength = std::clamp(static_cast<int>(m.cn0_dbhz / 6), 1, 9);
       const char lli = m.lli == 0 ? ' ' : static_cast<char>('0' + m.lli);
       text += formatted("%14.3f  ", m.code_m);
@@ -87,7 +92,8 @@ namespace searvins::simulator {
   const GpsTime own_time{o.toe.ns - (beidou ? kBeidouLagSeconds * kNanosecondsPerSecond : 0)};
   const CivilTime c = civil_from_gps(own_time);
   const double week = static_cast<double>(o.toe.week() - (beidou ? kBeidouWeekOffset : 0));
-  const double issue = beidou ? 1 : o.number + 40, accuracy_m = galileo ? 3.12 : 2.0, source = galileo ? 517 : beidou ? 0 : 1;
+  const double issue = (beidou ? 1 : o.number + 40) + o.issue_shift, accuracy_m = galileo ? 3.12 : 2.0;
+  const double source = galileo ? 517 : beidou ? 0 : 1;
   const double sent_s = o.toe_of_week_s - (o.system == 'G' ? 7182 : galileo ? -600 : 0);
   const double delays[2] = {galileo ? o.other_delay_s : o.delay_s, galileo ? o.delay_s : beidou ? o.other_delay_s : issue};
   const double rows[7][4] = {{issue, o.crs, o.delta_n, o.m0},

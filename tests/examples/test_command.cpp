@@ -48,7 +48,7 @@ struct Fixture {
 TEST_CASE("command: help and version of the command and of each subcommand exit with 0") {
   CHECK(run("--version").output == std::string{"searvins "} + kVersionString + "\n");
   CHECK(run("--help").exit_code == 0);
-  for (const char* name : {"solve", "info", "evaluate", "demo"}) {
+  for (const char* name : {"solve", "info", "evaluate", "simulate", "demo"}) {
     CHECK_MESSAGE(run(std::string{name} + " --help").exit_code == 0, name);
     CHECK_MESSAGE(has(run(std::string{name} + " --help"), std::string{"searvins "} + name), name);
     CHECK_MESSAGE(run(std::string{name} + " --version").output == std::string{"searvins "} + kVersionString + "\n", name);
