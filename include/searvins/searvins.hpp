@@ -12,10 +12,14 @@
 #include <searvins/ambiguity/unimodular.hpp>
 
 #include <searvins/core/pool.hpp>
+#include <searvins/core/ring_buffer.hpp>
 #include <searvins/core/static_vector.hpp>
 #include <searvins/core/status.hpp>
 #include <searvins/core/time.hpp>
 
+#include <searvins/estimator/estimator.hpp>
+#include <searvins/estimator/free_motion.hpp>
+#include <searvins/estimator/inertial_motion.hpp>
 #include <searvins/estimator/noise_scale.hpp>
 #include <searvins/estimator/rtk_estimator.hpp>
 #include <searvins/estimator/rtk_options.hpp>
@@ -58,6 +62,7 @@
 #include <searvins/imu/imu_factor.hpp>
 #include <searvins/imu/imu_sample.hpp>
 #include <searvins/imu/initializer.hpp>
+#include <searvins/imu/lever_arm.hpp>
 #include <searvins/imu/motion_accumulator.hpp>
 #include <searvins/imu/navigation_prior.hpp>
 #include <searvins/imu/navigation_state.hpp>

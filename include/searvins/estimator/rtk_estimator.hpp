@@ -46,10 +46,14 @@ class RtkEstimator {
   using Smoother = smoother::FixedLagSmoother<Problem>;
   using CodePhaseForm = typename Config::CodePhaseForm;
   using DopplerForm = typename Config::DopplerForm;
+  using Motion = typename Config::Motion;
+  using State = typename Motion::State;
+  using StateCovariance = typename Motion::Covariance;
 
   /// Settings of the robust policies are those of the forms themselves (their `loss`).
-  explicit RtkEstimator(const RtkOptions& options = {}, const CodePhaseForm& code_phase = {}, const DopplerForm& doppler = {})
-      : options_(options), code_phase_form_(code_phase), doppler_form_(doppler), tracker_(options.tracker) {
+  explicit RtkEstimator(const RtkOptions& options = {}, const CodePhaseForm& code_phase = {}, const DopplerForm& doppler = {},
+                        const typename Motion::Options& motion = {})
+      : options_(options), code_phase_form_(code_phase), doppler_form_(doppler), motion_(options, motion), tracker_(options.tracker) {
     continuation_.mode = options.continuity;
     continuation_.max_arc_epochs = options.arc_epochs;
     if (is_instantaneous()) return;
@@ -73,18 +77,63 @@ class RtkEstimator {
     if (started_ && rover.tag <= last_tag_)
       return failure(rover.tag == last_tag_ ? StatusCode::duplicate : StatusCode::out_of_order, "rover epoch not after the last one", -1, -1, seconds_between(last_tag_, rover.tag));
     const Result<gnss::TrackedPosition> tracked = tracker_.update(rover, ephemerides_);
-    if (!tracked.ok() && !window_running()) return tracked.status();
+    if (!tracked.ok() && !has_state_) return tracked.status();
     RtkSolution out = begin(rover, tracked);
     started_ = true, last_tag_ = rover.tag;
     const Status differenced = difference(rover, tracked, out);
-    if (differenced.ok() && epoch_.satellites >= options_.min_satellites && extend(out)) {
+    const bool is_differenced = differenced.ok() && epoch_.satellites >= options_.min_satellites;
+    if (!is_differenced) continuation_.skip_epoch();
+    if (!differenced.ok() && goes_on_without_gnss()) drop_differences();
+    if ((is_differenced || goes_on_without_gnss()) && extend(out))
       estimate(out);
-    } else {
-      continuation_.skip_epoch();
+    else
       without_differences(tracked, out);
-    }
     return out;
   }
+
+  /// A state without GNSS at a time after the last one, where the motion policy carries the window on. Errors: no_data (it does not, or there is no
+  /// state yet), out_of_order, and those of the motion (IMU coverage); nothing was changed then.
+  Result<RtkSolution> advance(GpsTime time) {
+    if (!goes_on_without_gnss()) return failure(StatusCode::no_data, "nothing carries the window on without GNSS");
+    if (time <= last_time_) return failure(StatusCode::out_of_order, "a state not after the last one");
+    if (const auto x = motion_.predict(last_state_, last_time_, time); !x.ok()) return x.status();
+    RtkSolution out;
+    out.tag = out.time = time;
+    out.clock_offset_s = clock_offset_s_;
+    single_point_ = {};
+    predict(failure(StatusCode::no_data, "no rover epoch"), out);
+    drop_differences(), epoch_.doppler.clear(), epoch_.doppler_pivot = -1;
+    continuation_.skip_epoch();
+    if (extend(out))
+      estimate(out);
+    else
+      without_differences(failure(StatusCode::no_data, "no rover epoch"), out);
+    return out;
+  }
+
+  /// Starts from a known state (an alignment) in a frame; a window that is running is dropped.
+  void begin_at(const State& state, const StateCovariance& covariance, GpsTime time, const geodesy::LocalFrame& frame) {
+    restart();
+    frame_ = frame;
+    motion_.set_frame(frame);
+    settle(state, covariance, time);
+  }
+  /// The antenna at a time after the newest state by the motion alone; nothing is changed. Errors: no_data, and those of the motion.
+  [[nodiscard]] Result<RtkSolution> predict_at(GpsTime time) const {
+    if (!has_state_) return failure(StatusCode::no_data, "there is no state yet");
+    const auto x = motion_.predict(last_state_, last_time_, time);
+    if (!x.ok()) return x.status();
+    RtkSolution out;
+    out.tag = out.time = time;
+    describe(*x, motion_.predicted_covariance(last_state_, last_covariance_, last_time_, time), motion_.antenna_at(time), out);
+    return out;
+  }
+  [[nodiscard]] Motion& motion() { return motion_; }
+  [[nodiscard]] const Motion& motion() const { return motion_; }
+  /// Whether there is a state to go on from, and it: the newest estimate.
+  [[nodiscard]] bool has_state() const { return has_state_; }
+  [[nodiscard]] const State& state() const { return last_state_; }
+  [[nodiscard]] GpsTime state_time() const { return last_time_; }
 
   /// The differenced epoch of the last update, for reports.
   [[nodiscard]] const gnss::DifferencedEpoch& differenced() const { return epoch_; }
@@ -105,7 +154,7 @@ class RtkEstimator {
   [[nodiscard]] Result<LaggedState> oldest() const {
     if (!window_running()) return failure(StatusCode::no_data, "no window is running");
     const Node& n = nodes_.front();
-    return LaggedState{n.time, frame_.to_ecef(smoother_.find(n.state)->p_wa_m), n.status};
+    return LaggedState{n.time, frame_.to_ecef(n.antenna.position_w_m(*smoother_.find(n.state))), n.status};
   }
 
  private:
@@ -115,8 +164,9 @@ class RtkEstimator {
 
   /// A state of the window.
   struct Node {
-    smoother::Key<gnss::Pva> state{};
+    smoother::Key<State> state{};
     GpsTime time{};
+    typename Motion::Antenna antenna{};
     SolutionStatus status{SolutionStatus::dr};
   };
   /// A double-difference ambiguity of the present epoch: a, minus b when states are single differences.
@@ -146,29 +196,40 @@ class RtkEstimator {
     }
     out.clock_offset_s = clock_offset_s_;
     out.time = tracked.ok() ? tracked->time : rover.tag.plus_seconds(-clock_offset_s_);
-    if (window_running() && seconds_between(nodes_.back().time, out.time) > options_.max_gap_s) restart();
+    if (window_running() && !Motion::is_inertial && since_last(out) > options_.max_gap_s) restart();
     return out;
   }
 
-  [[nodiscard]] double since_last(const RtkSolution& out) const { return seconds_between(nodes_.back().time, out.time); }
+  [[nodiscard]] double since_last(const RtkSolution& out) const { return seconds_between(last_time_, out.time); }
+  [[nodiscard]] bool goes_on_without_gnss() const { return Motion::is_inertial && has_state_; }
+  void settle(const State& state, const StateCovariance& covariance, GpsTime time) {
+    last_state_ = state, last_covariance_ = covariance, last_time_ = time, has_state_ = true;
+    motion_.settle(state, covariance, time);
+  }
 
   /// The window's prediction is worth starting from when it is not older than this.
   static constexpr double kTrustedPredictionS = 2.5;
 
   /// Where the epoch probably is, before its differences are looked at, with a sigma.
   void predict(const Result<gnss::TrackedPosition>& tracked, const RtkSolution& out) {
-    const bool from_window = window_running() && (since_last(out) <= kTrustedPredictionS || !tracked.ok());
-    if (from_window) {
-      const gnss::Pva x = smoother_.find(nodes_.back().state)->predict(since_last(out));
-      const double dt = since_last(out);
-      predicted_e_m_ = frame_.to_ecef(x.p_wa_m);
-      predicted_v_e_mps_ = frame_.R_ew * x.v_wa_mps;
-      predicted_sigma_m_ = std::sqrt(last_variance_m2_ + dt * dt * last_velocity_variance_ + options_.jerk_psd_m2ps5 * std::pow(dt, 5) / 20);
-    } else {
-      predicted_e_m_ = tracked->position_e_m;
-      predicted_v_e_mps_ = tracked->velocity_e_mps;
-      predicted_sigma_m_ = std::max(2.0, 2 * std::sqrt(tracked->position_covariance_m2.trace()));
+    const bool trusted = Motion::is_inertial || (window_running() && since_last(out) <= kTrustedPredictionS) || !tracked.ok();
+    is_predicted_ = false;
+    if (has_state_ && trusted && since_last(out) > 0) {
+      if (const auto x = motion_.predict(last_state_, last_time_, out.time); x.ok()) {
+        const auto antenna = motion_.antenna_at(out.time);
+        predicted_ = *x, is_predicted_ = true;
+        predicted_covariance_ = motion_.predicted_covariance(last_state_, last_covariance_, last_time_, out.time);
+        const auto P = Motion::antenna_covariance(predicted_, predicted_covariance_, antenna);
+        predicted_e_m_ = frame_.to_ecef(antenna.position_w_m(predicted_));
+        predicted_v_e_mps_ = frame_.R_ew * antenna.velocity_w_mps(predicted_);
+        predicted_sigma_m_ = std::sqrt(std::max(1e-4, P.template topLeftCorner<3, 3>().trace()));
+        return;
+      }
     }
+    if (!tracked.ok()) return;  // the last prediction stands
+    predicted_e_m_ = tracked->position_e_m;
+    predicted_v_e_mps_ = tracked->velocity_e_mps;
+    predicted_sigma_m_ = std::max(2.0, 2 * std::sqrt(tracked->position_covariance_m2.trace()));
   }
 
   // ---- difference ------------------------------------------------------------------------------------------------------------------------
@@ -181,6 +242,12 @@ class RtkEstimator {
     return epoch_.base_status;
   }
 
+  /// What is left of the epoch are its Doppler shifts, which need no base.
+  void drop_differences() {
+    epoch_.signals.clear(), epoch_.groups.clear();
+    epoch_.satellites = 0;
+  }
+
   /// Without double differences: the better of prediction and single point, said so.
   void without_differences(const Result<gnss::TrackedPosition>& tracked, RtkSolution& out) {
     out.satellites = tracked.ok() ? single_point_.used : 0;
@@ -191,7 +258,7 @@ class RtkEstimator {
     } else {
       out.position_e_m = predicted_e_m_, out.velocity_e_mps = predicted_v_e_mps_;
       out.covariance_enu_m2 = Eigen::Matrix3d::Identity() * predicted_sigma_m_ * predicted_sigma_m_;
-      out.velocity_covariance_enu = Eigen::Matrix3d::Identity() * last_velocity_variance_;
+      out.velocity_covariance_enu = Eigen::Matrix3d::Identity() * std::max(1.0, predicted_sigma_m_ * predicted_sigma_m_ / 100);
     }
   }
   static void set_from_tracker(const gnss::TrackedPosition& t, RtkSolution& out) {
@@ -206,35 +273,44 @@ class RtkEstimator {
   /// False when the state was refused (smoother_status says why): the window is as it was.
   [[nodiscard]] bool extend(RtkSolution& out) {
     out.satellites = epoch_.satellites;
+    antenna_ = motion_.antenna_at(out.time);
     continuation_.begin_epoch();
     select_phases();
     const Eigen::Vector3d start_e_m = snapshot_position();
     if (!window_running()) {
-      frame_ = geodesy::LocalFrame::at(start_e_m);
+      if (!Motion::is_inertial) frame_ = geodesy::LocalFrame::at(start_e_m);
       out.restarted = true;
     }
-    gnss::Pva start;
-    start.p_wa_m = frame_.to_local(start_e_m);
-    start.v_wa_mps = frame_.R_ew.transpose() * predicted_v_e_mps_;
-    if (window_running()) start.a_wa_mps2 = smoother_.find(nodes_.back().state)->a_wa_mps2;
-    if (is_instantaneous()) restart();  // an epoch stands for itself: nothing of earlier codes reaches it through the motion
+    const State start = motion_.placed(is_predicted_ ? predicted_ : State{}, antenna_, frame_.to_local(start_e_m), frame_.R_ew.transpose() * predicted_v_e_mps_);
+    if (is_instantaneous() && !Motion::is_inertial) restart();  // an epoch stands for itself: nothing of earlier codes reaches it through the motion
     while (nodes_.full()) marginalise_oldest();
     const auto state = smoother_.add_variable(start, out.time);
     if (!state.ok()) {
       out.smoother_status = state.status();
       return false;
     }
-    if (window_running())
-      add(gnss::WhiteJerkFactor{nodes_.back().state, *state, std::max(1e-3, since_last(out)), options_.jerk_psd_m2ps5}, out);
-    else
-      add(gnss::PvaPriorFactor{*state, start, options_.start_sigma_m, options_.start_velocity_sigma_mps, options_.start_acceleration_sigma_mps2}, out);
-    (void)nodes_.push_back({*state, out.time, SolutionStatus::dr});
+    const Status linked = window_running() ? motion_.add_link(smoother_, nodes_.back().state, *state, nodes_.back().time, out.time, out)
+                                           : motion_.add_start(smoother_, *state, start, start_covariance());
+    if (!linked.ok()) {
+      out.smoother_status = linked;
+      (void)smoother_.remove_variable(*state);
+      return false;
+    }
+    (void)nodes_.push_back({*state, out.time, antenna_, SolutionStatus::dr});
     code_keys_.clear(), phase_keys_.clear(), differences_.clear();
     code_variance_factor_ = code_noise_.variance_factor(), phase_variance_factor_ = phase_noise_.variance_factor();
     code_information_share_ = 1 / correlation_factor(out);
     for (int g = 0; g < static_cast<int>(epoch_.groups.size()); ++g) add_group(g, *state, start_e_m, out);
     if (options_.use_doppler) add_doppler(*state, out);
     return true;
+  }
+
+  /// What a new window starts from: the prediction, widened where the last window was given up.
+  [[nodiscard]] StateCovariance start_covariance() {
+    StateCovariance P = is_predicted_ ? predicted_covariance_ : StateCovariance::Identity();
+    if (doubt_m_ > 0) P = Motion::widened(P, doubt_m_);
+    doubt_m_ = 0;
+    return P;
   }
 
   [[nodiscard]] bool is_instantaneous() const { return options_.continuity == ambiguity::ContinuityMode::instantaneous; }
@@ -365,7 +441,7 @@ class RtkEstimator {
     return snapshot_.solve();
   }
 
-  void add_group(int g, smoother::Key<gnss::Pva> state, const Eigen::Vector3d& start_e_m, RtkSolution& out) {
+  void add_group(int g, smoother::Key<State> state, const Eigen::Vector3d& start_e_m, RtkSolution& out) {
     const gnss::SignalGroup& group = epoch_.groups[at(g)];
     typename Problem::CodeFactor code;
     begin_batch(code, state, group.pivot);
@@ -407,9 +483,10 @@ class RtkEstimator {
   }
 
   template <class F>
-  void begin_batch(F& factor, smoother::Key<gnss::Pva> state, int pivot) const {
+  void begin_batch(F& factor, smoother::Key<State> state, int pivot) const {
     factor.state = state;
     factor.frame = frame_;
+    factor.antenna = antenna_;
     factor.pivot.satellite_e_m = epoch_.signals[at(pivot)].satellite_e_m;
   }
 
@@ -489,11 +566,12 @@ class RtkEstimator {
     return *key;
   }
 
-  void add_doppler(smoother::Key<gnss::Pva> state, RtkSolution& out) {
+  void add_doppler(smoother::Key<State> state, RtkSolution& out) {
     if (epoch_.doppler_pivot < 0 || epoch_.doppler.size() < 2) return;
     typename Problem::DopplerFactor factor;
     factor.state = state;
     factor.frame = frame_;
+    factor.antenna = antenna_;
     std::array<double, static_cast<std::size_t>(Cap::doppler_candidates)> variances{};
     for (std::size_t i = 0; i < epoch_.doppler.size(); ++i) {
       const gnss::DopplerMeasurement& d = epoch_.doppler[i];
@@ -515,7 +593,7 @@ class RtkEstimator {
   void estimate(RtkSolution& out) {
     smoother_.template set_enabled<gnss::IntegerFix>(false);
     if (!optimise(out)) return recover(out);
-    out.status = out.phases > 0 ? SolutionStatus::float_ : SolutionStatus::dgnss;
+    out.status = out.phases > 0 ? SolutionStatus::float_ : out.double_differences > 0 ? SolutionStatus::dgnss : SolutionStatus::dr;
     const bool have_float = collect_float(out);
     while (is_window_long(out)) marginalise_oldest();
     forget_gone_integers();
@@ -547,13 +625,14 @@ class RtkEstimator {
 
   /// The window could not be solved: it is dropped, the epoch answers from its own start.
   void recover(RtkSolution& out) {
-    const gnss::Pva* x = smoother_.find(nodes_.back().state);
-    out.status = SolutionStatus::dgnss;
-    out.position_e_m = frame_.to_ecef(x->p_wa_m), out.velocity_e_mps = frame_.R_ew * x->v_wa_mps;
-    out.covariance_enu_m2 = Eigen::Matrix3d::Identity() * std::max(25.0, predicted_sigma_m_ * predicted_sigma_m_);
+    out.status = out.double_differences > 0 ? SolutionStatus::dgnss : SolutionStatus::dr;
+    set_antenna(*smoother_.find(nodes_.back().state), antenna_, out);
+    const double sigma_m = std::max(5.0, predicted_sigma_m_);
+    out.covariance_enu_m2 = Eigen::Matrix3d::Identity() * sigma_m * sigma_m;
     out.velocity_covariance_enu = Eigen::Matrix3d::Identity();
     out.verdict = ambiguity::ResolutionVerdict::ill_conditioned;
     restart();
+    doubt_m_ = sigma_m;
   }
 
   [[nodiscard]] bool is_window_long(const RtkSolution& out) const {
@@ -579,19 +658,26 @@ class RtkEstimator {
       a_column_[k] = column_of(differences_[k].a);
       b_column_[k] = differences_[k].b.valid() ? column_of(differences_[k].b) : -1;
     }
-    const int n = 9 + static_cast<int>(keys_.size()) - 1;
+    const int n = State::dof + static_cast<int>(keys_.size()) - 1;
     const auto size = smoother_.joint_covariance(keys_.data(), static_cast<int>(keys_.size()), joint_.data(), n);
     if (!size.ok()) return false;
     const auto cov = [&](int i, int j) { return j < 0 || i < 0 ? 0.0 : joint_[at(j) * at(n) + at(i)]; };
     float_.n = static_cast<int>(differences_.size());
     // Rotation from the window's axes to East-North-Up at the position is below 1e-5 over 60 m, and gates want no more.
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) float_.Q_pp(a, b) = cov(a, b);
+    Eigen::Matrix<double, 3, State::dof> J;  // of the antenna's position by the state
+    (void)antenna_.position_w_m(*smoother_.find(nodes_.back().state), &J);
+    StateCovariance P;
+    for (int a = 0; a < State::dof; ++a)
+      for (int b = 0; b < State::dof; ++b) P(a, b) = cov(a, b);
+    const Eigen::Matrix<double, 3, State::dof> JP = J.lazyProduct(P);
+    float_.Q_pp = JP.lazyProduct(J.transpose());
     for (int i = 0; i < float_.n; ++i) {
       const int ai = a_column_[at(i)], bi = b_column_[at(i)];
       const Difference& d = differences_[at(i)];
       float_.a_cycles[at(i)] = smoother_.find(d.a)->value - (d.b.valid() ? smoother_.find(d.b)->value : 0.0);
-      for (int axis = 0; axis < 3; ++axis) float_.Q_pa[at(i)][axis] = cov(axis, ai) - cov(axis, bi);
+      Eigen::Matrix<double, State::dof, 1> c;
+      for (int axis = 0; axis < State::dof; ++axis) c[axis] = cov(axis, ai) - cov(axis, bi);
+      float_.Q_pa[at(i)] = J.lazyProduct(c);
       for (int j = 0; j <= i; ++j) {
         const int aj = a_column_[at(j)], bj = b_column_[at(j)];
         const double q = cov(ai, aj) - cov(ai, bj) - cov(bi, aj) + cov(bi, bj);
@@ -605,9 +691,9 @@ class RtkEstimator {
   [[nodiscard]] int column_of(const AmbiguityKey& key) {
     const smoother::AnyKey any = Smoother::WindowType::any(key);
     for (std::size_t k = 1; k < keys_.size(); ++k)
-      if (keys_[k] == any) return 8 + static_cast<int>(k);
+      if (keys_[k] == any) return State::dof - 1 + static_cast<int>(k);
     (void)keys_.push_back(any);
-    return 8 + static_cast<int>(keys_.size()) - 1;
+    return State::dof - 1 + static_cast<int>(keys_.size()) - 1;
   }
 
   void resolve(RtkSolution& out, StaticVector<smoother::Key<gnss::IntegerFix>, kPhasesSize>& fresh) {
@@ -689,18 +775,27 @@ class RtkEstimator {
     (void)optimise(out);
   }
 
+  void set_antenna(const State& x, const typename Motion::Antenna& antenna, RtkSolution& out) const {
+    out.position_e_m = frame_.to_ecef(antenna.position_w_m(x));
+    out.velocity_e_mps = frame_.R_ew * antenna.velocity_w_mps(x);
+  }
+
+  /// Antenna, covariances and attitude of a state.
+  void describe(const State& x, const StateCovariance& P, const typename Motion::Antenna& antenna, RtkSolution& out) const {
+    set_antenna(x, antenna, out);
+    const Eigen::Matrix3d R = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(out.position_e_m)).transpose() * frame_.R_ew;
+    const auto C = Motion::antenna_covariance(x, P, antenna);
+    out.covariance_enu_m2 = R * C.template topLeftCorner<3, 3>() * R.transpose();
+    out.velocity_covariance_enu = R * C.template bottomRightCorner<3, 3>() * R.transpose();
+    motion_.describe(x, P, R, out);
+  }
+
   void write(RtkSolution& out) {
-    const gnss::Pva& x = *smoother_.find(nodes_.back().state);
-    out.position_e_m = frame_.to_ecef(x.p_wa_m);
-    out.velocity_e_mps = frame_.R_ew * x.v_wa_mps;
-    const auto P = smoother_.covariance(nodes_.back().state);
-    if (P.ok()) {
-      const Eigen::Matrix3d R = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(out.position_e_m)).transpose() * frame_.R_ew;
-      out.covariance_enu_m2 = R * P->template topLeftCorner<3, 3>() * R.transpose();
-      out.velocity_covariance_enu = R * P->template block<3, 3>(3, 3) * R.transpose();
-    }
-    last_variance_m2_ = std::max(1e-4, out.covariance_enu_m2.trace());
-    last_velocity_variance_ = std::max(1e-4, out.velocity_covariance_enu.trace());
+    const State& x = *smoother_.find(nodes_.back().state);
+    const auto covariance = smoother_.covariance(nodes_.back().state);
+    const StateCovariance P = covariance.ok() ? *covariance : start_covariance();
+    describe(x, P, antenna_, out);
+    settle(x, P, nodes_.back().time);
     nodes_.back().status = out.status;
     out.code_weight = mean_weight(code_keys_);
     out.phase_weight = mean_weight(phase_keys_);
@@ -721,7 +816,9 @@ class RtkEstimator {
   /// A window whose codes mostly disagree with it, epoch after epoch, has drifted away: the next epoch starts anew.
   void watch_divergence(RtkSolution& out) {
     suspect_epochs_ = out.code_weight < 0.3 && !code_keys_.empty() ? suspect_epochs_ + 1 : 0;
-    if (suspect_epochs_ >= options_.min_suspect_epochs) restart();
+    if (suspect_epochs_ < options_.min_suspect_epochs) return;
+    restart();
+    doubt_m_ = 30;
   }
 
   /// Drops the window. Ephemerides, base and slip detection stay.
@@ -730,11 +827,13 @@ class RtkEstimator {
     nodes_.clear(), held_.clear(), code_keys_.clear(), phase_keys_.clear(), differences_.clear();
     continuation_.clear();
     suspect_epochs_ = 0;
+    if (!Motion::is_inertial) has_state_ = false;
   }
 
   RtkOptions options_;
   CodePhaseForm code_phase_form_;
   DopplerForm doppler_form_;
+  Motion motion_;
   gnss::SinglePointTracker tracker_;
   gnss::EphemerisStore<Cap::ephemerides> ephemerides_{};
   gnss::BaseBuffer<Cap::base_epochs> base_{};
@@ -755,10 +854,16 @@ class RtkEstimator {
   StaticVector<smoother::Key<typename Problem::PhaseFactor>, gnss::kMaxSignalGroups> phase_keys_{};
   StaticVector<smoother::AnyKey, 2 * kPhasesSize + 1> keys_{};
   std::array<int, kPhasesSize> a_column_{}, b_column_{};
-  std::array<double, (2 * kPhasesSize + 9) * (2 * kPhasesSize + 9)> joint_{};
+  std::array<double, (2 * kPhasesSize + State::dof) * (2 * kPhasesSize + State::dof)> joint_{};
   Snapshot<2 * gnss::kMaxCorrectedSignals> snapshot_{};
   Eigen::Vector3d predicted_e_m_{Eigen::Vector3d::Zero()}, predicted_v_e_mps_{Eigen::Vector3d::Zero()};
-  double predicted_sigma_m_{100}, last_variance_m2_{100}, last_velocity_variance_{100}, clock_offset_s_{0};
+  double predicted_sigma_m_{100}, clock_offset_s_{0};
+  State predicted_{}, last_state_{};  ///< of the epoch at hand by the motion alone; the newest estimate
+  StateCovariance predicted_covariance_{StateCovariance::Identity()}, last_covariance_{StateCovariance::Identity()};
+  typename Motion::Antenna antenna_{};  ///< at the epoch at hand
+  GpsTime last_time_{};
+  bool is_predicted_{false}, has_state_{false};
+  double doubt_m_{0};  ///< sigma that the next window's start is widened by
   GpsTime last_tag_{};
   bool started_{false};
   int suspect_epochs_{0};

@@ -50,6 +50,11 @@ struct RtkSolution {
   int released_integers{0};  ///< taken back at this epoch
   int iterations{0};        ///< Gauss-Newton iterations, float and fixed together
   bool restarted{false};    ///< the window was started (anew) at this epoch
+  bool has_attitude{false};  ///< an inertial estimator is aligned: the next members count
+  bool stationary{false};    ///< the inertial unit says that the vehicle stands
+  Eigen::Matrix3d R_nb{Eigen::Matrix3d::Identity()};            ///< body to East-North-Up at the position
+  Eigen::Vector3d attitude_sigma_rad{Eigen::Vector3d::Zero()};  ///< about east, north, up
+  Eigen::Vector3d accel_bias_b_mps2{Eigen::Vector3d::Zero()}, gyro_bias_b_radps{Eigen::Vector3d::Zero()};
   Status smoother_status{};  ///< of the last optimisation
 };
 

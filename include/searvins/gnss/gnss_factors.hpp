@@ -16,7 +16,8 @@
 /// The covariance of the batch is diag(sigma_s^2) + sigma_o^2 11'; whitening, latent pivot and weights are those of robust/formulation.hpp. The change
 /// of u_s with position is neglected in the Doppler Jacobian only (1 m moves a rate by v / 2e7).
 ///
-/// A state type takes part by two free functions, antenna_position_w_m(x, J*) and antenna_velocity_w_mps(x, J*).
+/// Where the antenna is on a state is said by an antenna model: position_w_m(x, J*) and velocity_w_mps(x, J*), J = d / d state (3 x dof). The default
+/// goes to the free functions antenna_position_w_m(x, J*) and antenna_velocity_w_mps(x, J*) of a state that is the antenna itself.
 #pragma once
 
 #include <Eigen/Core>
@@ -42,8 +43,20 @@ struct BatchMember {
   double z{0};                                             ///< base-corrected observation, metres; Doppler: corrected range rate, m/s
 };
 
+/// The antenna of a state that describes the antenna itself.
+struct DirectAntenna {
+  template <class State>
+  [[nodiscard]] Eigen::Vector3d position_w_m(const State& x, Eigen::Matrix<double, 3, State::dof>* d_state = nullptr) const {
+    return antenna_position_w_m(x, d_state);
+  }
+  template <class State>
+  [[nodiscard]] Eigen::Vector3d velocity_w_mps(const State& x, Eigen::Matrix<double, 3, State::dof>* d_state = nullptr) const {
+    return antenna_velocity_w_mps(x, d_state);
+  }
+};
+
 /// See the file comment. MaxCandidates: largest batch without the pivot.
-template <class State, class FormulationType, Observable kObservable, int MaxCandidates>
+template <class State, class FormulationType, Observable kObservable, int MaxCandidates, class Antenna = DirectAntenna>
 struct DifferenceFactor {
   using Scalar = double;
   static constexpr bool is_phase = kObservable == Observable::phase;
@@ -58,6 +71,7 @@ struct DifferenceFactor {
   StaticVector<smoother::Key<Ambiguity>, is_phase ? static_cast<std::size_t>(MaxCandidates) : 1> ambiguities{};  ///< one a candidate, phase only
   smoother::Key<PivotError> latent{};          ///< latent formulations only
   geodesy::LocalFrame frame{};
+  Antenna antenna{};
   BatchMember pivot{};
   StaticVector<BatchMember, static_cast<std::size_t>(MaxCandidates)> candidates{};
   double wavelength_m{0};
@@ -85,16 +99,16 @@ struct DifferenceFactor {
   void residuals(const Values& values, double* r, Eigen::Matrix<double, MaxCandidates, 3>* d_r_d_antenna = nullptr) const {
     const State& x = values(state);
     Eigen::Vector3d u_o;
-    Eigen::Vector3d antenna;
+    Eigen::Vector3d at;  // ECEF position, or velocity for Doppler
     if constexpr (kObservable == Observable::doppler)
-      antenna = frame.R_ew * antenna_velocity_w_mps(x);
+      at = frame.R_ew * antenna.velocity_w_mps(x);
     else
-      antenna = frame.to_ecef(antenna_position_w_m(x));
-    const double h_o = model(antenna, pivot, u_o);
+      at = frame.to_ecef(antenna.position_w_m(x));
+    const double h_o = model(at, pivot, u_o);
     for (int i = 0; i < size(); ++i) {
       const BatchMember& c = candidates[static_cast<std::size_t>(i)];
       Eigen::Vector3d u;
-      r[i] = (c.z - pivot.z) - (model(antenna, c, u) - h_o);
+      r[i] = (c.z - pivot.z) - (model(at, c, u) - h_o);
       if constexpr (is_phase) {
         const double n_o = pivot_ambiguity.valid() ? values(pivot_ambiguity).value : 0.0;
         r[i] -= wavelength_m * (values(ambiguities[static_cast<std::size_t>(i)]).value - n_o);
@@ -121,9 +135,9 @@ struct DifferenceFactor {
     const int columns = State::dof + static_cast<int>(is_phase ? ambiguities.size() : 0) + (is_phase && pivot_ambiguity.valid() ? 1 : 0);
     Eigen::Matrix<double, 3, State::dof> d_state;
     if constexpr (kObservable == Observable::doppler)
-      (void)antenna_velocity_w_mps(values(state), &d_state);
+      (void)antenna.velocity_w_mps(values(state), &d_state);
     else
-      (void)antenna_position_w_m(values(state), &d_state);
+      (void)antenna.position_w_m(values(state), &d_state);
     Dense d_r;
     d_r.m = m, d_r.n = columns;
     for (int i = 0; i < m; ++i)
@@ -167,12 +181,12 @@ struct DifferenceFactor {
     [[nodiscard]] int cols() const { return n; }
   };
 
-  [[nodiscard]] static double model(const Eigen::Vector3d& antenna, const BatchMember& s, Eigen::Vector3d& u) {
+  [[nodiscard]] static double model(const Eigen::Vector3d& at_e, const BatchMember& s, Eigen::Vector3d& u) {
     if constexpr (kObservable == Observable::doppler) {
       u = s.satellite_e_m;
-      return u.dot(antenna);
+      return u.dot(at_e);
     } else {
-      return range_m(antenna, s.satellite_e_m, &u);
+      return range_m(at_e, s.satellite_e_m, &u);
     }
   }
   template <class Values>

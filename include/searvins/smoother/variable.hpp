@@ -91,4 +91,17 @@ struct Types {
   }
 };
 
+namespace detail {
+template <class A, class B>
+struct JoinedTypes;
+template <class... A, class... B>
+struct JoinedTypes<Types<A...>, Types<B...>> {
+  using type = Types<A..., B...>;
+};
+}  // namespace detail
+
+/// Two lists one after the other.
+template <class A, class B>
+using Joined = typename detail::JoinedTypes<A, B>::type;
+
 }  // namespace searvins::smoother

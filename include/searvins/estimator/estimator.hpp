@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// \file
+/// RTK and inertial navigation from the first epoch on: the estimator that most users touch.
+///
+/// Readings, base and rover epochs come in any order within the declared latency; next() answers one solution after the other, in time order:
+///
+///     before alignment   GNSS alone (RtkEstimator<FreeMotion>); its velocities and positions align the unit (imu/initializer.hpp)
+///     aligned            navigation states, tightly coupled (RtkEstimator<InertialMotion>)
+///     no rover epoch     states from the inertial unit alone, every silence_s, labelled dr
+///     readings missing   GNSS alone again, until readings are back and aligned
+///
+/// A rover epoch is answered when readings reach past it, or when the newest input is later than it by the latency: nothing waits for ever. A window that
+/// had to be given up several times in a row is taken for a wrong alignment, which is then made anew.
+///
+/// The object is about a hundred megabytes with HostedCapacity and never allocates: create it once, static or on the heap, never as a local.
+#pragma once
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cstddef>
+#include <optional>
+
+#include <searvins/core/ring_buffer.hpp>
+#include <searvins/core/status.hpp>
+#include <searvins/core/time.hpp>
+#include <searvins/estimator/inertial_motion.hpp>
+#include <searvins/estimator/rtk_estimator.hpp>
+#include <searvins/estimator/rtk_options.hpp>
+#include <searvins/estimator/rtk_solution.hpp>
+#include <searvins/geodesy/local_frame.hpp>
+#include <searvins/imu/imu_sample.hpp>
+#include <searvins/imu/initializer.hpp>
+#include <searvins/stationary/detector.hpp>
+
+namespace searvins::estimator {
+
+/// Settings. The unit's noise and the lever arm are those of `inertial`, also for the initialisation.
+struct EstimatorOptions {
+  RtkOptions rtk{};
+  InertialOptions inertial{};
+  imu::InitializerSettings initializer{};
+  double latency_s{0.2};       ///< how much later than the rest a stream may come
+  double silence_s{1};         ///< a state from the inertial unit alone after this time without a rover epoch
+  int restarts_to_realign{3};  ///< windows given up within realign_within_s, after which the alignment is made anew
+  double realign_within_s{30};
+};
+
+/// See the file comment. Config: RtkConfig with FreeMotion.
+template <template <class> class Form, class CapacityType = HostedCapacity, class Earth = imu::RotatingEarth>
+class Estimator {
+ public:
+  using Free = RtkEstimator<RtkConfig<Form, CapacityType>>;
+  using Bound = RtkEstimator<RtkConfig<Form, CapacityType, InertialMotion<Earth>>>;
+  using Options = EstimatorOptions;
+
+  explicit Estimator(const Options& options = {})
+      : options_(options), free_(options.rtk), bound_(inertial_rtk(options.rtk), {}, {}, options.inertial), initializer_(initializer_settings(options)),
+        detector_(options.inertial.preintegration.noise, options.inertial.detector) {}
+
+  /// Broadcast records. Errors: capacity_exceeded.
+  Status add_ephemeris(const gnss::Ephemeris& e) {
+    (void)bound_.add_ephemeris(e);
+    return free_.add_ephemeris(e);
+  }
+  void set_ionosphere(const gnss::KlobucharCoefficients& k) { free_.set_ionosphere(k), bound_.set_ionosphere(k); }
+  /// Base antenna, ECEF metres. Errors: non_finite, invalid_argument.
+  Status set_base_position(const Eigen::Vector3d& position_e_m) {
+    (void)bound_.set_base_position(position_e_m);
+    return free_.set_base_position(position_e_m);
+  }
+  /// A heading from elsewhere, clockwise from north, of the present moment. Errors: those of imu::Initializer::set_heading.
+  Status set_heading(double heading_rad, double sigma_rad) { return initializer_.set_heading(heading_rad, sigma_rad); }
+
+  /// A reading, in time order. Errors: non_finite, duplicate, out_of_order, capacity_exceeded (ask next() for solutions more often).
+  Status add_imu(const imu::ImuSample& sample) {
+    if (!sample.finite()) return failure(StatusCode::non_finite, "IMU sample with a NaN or infinite reading");
+    if (has_imu_ && sample.time == newest_imu_) return failure(StatusCode::duplicate, "IMU sample with the time of the one before");
+    if (has_imu_ && sample.time < newest_imu_) return failure(StatusCode::out_of_order, "IMU sample earlier than the one before");
+    if (!samples_.push(sample)) return failure(StatusCode::capacity_exceeded, "IMU samples wait for next(): take solutions more often");
+    has_imu_ = true, newest_imu_ = sample.time;
+    see(sample.time);
+    return ok_status();
+  }
+  /// A base epoch, in time order. Errors: duplicate, out_of_order.
+  Status add_base(const gnss::ObservationEpoch& epoch) {
+    (void)bound_.add_base(epoch);
+    return free_.add_base(epoch);
+  }
+  /// A rover epoch, in time order. Errors: duplicate, out_of_order (also: later than the latency), capacity_exceeded.
+  Status add_rover(const gnss::ObservationEpoch& epoch) {
+    if (has_rover_ && epoch.tag <= newest_rover_)
+      return failure(epoch.tag == newest_rover_ ? StatusCode::duplicate : StatusCode::out_of_order, "rover epoch not after the last one");
+    if (has_answered_ && epoch.tag <= answered_) return failure(StatusCode::out_of_order, "rover epoch later than the declared latency");
+    if (!epochs_.push(epoch)) return failure(StatusCode::capacity_exceeded, "rover epochs wait for next(): take solutions more often");
+    has_rover_ = true, newest_rover_ = epoch.tag;
+    see(epoch.tag);
+    return ok_status();
+  }
+  /// No more input will come: what waits is due.
+  void finish() { finished_ = true; }
+
+  /// The next solution that is due. Errors: no_data when none is; else what is wrong with the epoch that was next (it is gone then).
+  Result<RtkSolution> next() {
+    if (!epochs_.empty() && is_due(epochs_.front().tag)) {
+      // Copied: the queue's place may be taken while the epoch is worked on.
+      epoch_ = epochs_.front();
+      epochs_.pop();
+      return answer(solve(epoch_));
+    }
+    if (is_silent()) return answer(bridge());
+    return failure(StatusCode::no_data, "no solution is due");
+  }
+
+  /// The antenna at a time after the newest state, from readings alone: output at the unit's rate. Errors: no_data (not aligned, not covered).
+  [[nodiscard]] Result<RtkSolution> predict(GpsTime time) const {
+    if (!aligned_) return failure(StatusCode::no_data, "not aligned yet");
+    return bound_.predict_at(time);
+  }
+
+  [[nodiscard]] bool is_aligned() const { return aligned_; }
+  /// What the alignment is at, and in words what it waits for.
+  [[nodiscard]] imu::AlignmentState alignment_state() const { return aligned_ ? imu::AlignmentState::aligned : initializer_.state(); }
+  [[nodiscard]] const char* waiting_text() const { return aligned_ ? imu::text_of(imu::AlignmentWait::nothing) : initializer_.waiting_text(); }
+  [[nodiscard]] int alignments() const { return alignments_; }
+  /// The estimator that gave the last solution, for reports.
+  [[nodiscard]] const gnss::DifferencedEpoch& differenced() const { return aligned_ ? bound_.differenced() : free_.differenced(); }
+  [[nodiscard]] const gnss::SinglePointSolution& single_point() const { return aligned_ ? bound_.single_point() : free_.single_point(); }
+  [[nodiscard]] const Bound& inertial() const { return bound_; }
+  [[nodiscard]] const Free& gnss_only() const { return free_; }
+
+ private:
+  static constexpr double kClockMarginS = 0.03;  ///< a state's time lies this much around its epoch's tag
+
+  /// With an inertial unit two satellites are worth differencing, and a window does not end with a gap.
+  [[nodiscard]] static RtkOptions inertial_rtk(RtkOptions options) {
+    options.min_satellites = std::min(options.min_satellites, 2);
+    return options;
+  }
+  [[nodiscard]] static imu::InitializerSettings initializer_settings(const Options& options) {
+    imu::InitializerSettings s = options.initializer;
+    s.noise = options.inertial.preintegration.noise;
+    s.lever_arm_b_m = options.inertial.lever_arm_b_m;
+    return s;
+  }
+
+  void see(GpsTime t) {
+    if (!has_input_ || t > newest_input_) newest_input_ = t;
+    has_input_ = true;
+  }
+  /// Readings reach past the epoch, or nobody may wait any longer.
+  [[nodiscard]] bool is_due(GpsTime tag) const {
+    return finished_ || (has_imu_ && newest_imu_ >= tag.plus_seconds(kClockMarginS)) || seconds_between(tag, newest_input_) > options_.latency_s;
+  }
+  /// Readings reach further than a rover epoch may still be missing for.
+  [[nodiscard]] bool is_silent() const {
+    if (!aligned_ || !epochs_.empty()) return false;
+    const GpsTime next = bound_.state_time().plus_seconds(options_.silence_s);
+    return has_imu_ && newest_imu_ >= next.plus_seconds(finished_ ? 0.0 : options_.latency_s);
+  }
+
+  Result<RtkSolution> answer(Result<RtkSolution> solution) {
+    if (!solution.ok()) return solution;
+    has_answered_ = true, answered_ = solution->tag;
+    return solution;
+  }
+
+  [[nodiscard]] Result<RtkSolution> solve(const gnss::ObservationEpoch& epoch) {
+    if (aligned_) {
+      feed_motion(epoch.tag.plus_seconds(kClockMarginS));
+      if (aligned_ && bound_.motion().covers(epoch.tag.plus_seconds(-kClockMarginS))) {
+        const Result<RtkSolution> solution = bound_.update(epoch);
+        if (solution.ok()) watch(*solution);
+        return solution;
+      }
+      lose_alignment();
+    }
+    feed_initializer(epoch.tag);
+    const Result<RtkSolution> solution = free_.update(epoch);
+    if (solution.ok() && has_imu_) align(*solution);
+    return solution;
+  }
+
+  /// A state from the readings alone.
+  [[nodiscard]] Result<RtkSolution> bridge() {
+    const GpsTime time = bound_.state_time().plus_seconds(options_.silence_s);
+    feed_motion(time.plus_seconds(kClockMarginS));
+    const Result<RtkSolution> solution = aligned_ ? bound_.advance(time) : Result<RtkSolution>{failure(StatusCode::no_data, "readings are missing")};
+    if (!solution.ok()) lose_alignment();
+    return solution;
+  }
+
+  /// Hands readings up to a time, and one beyond, to the motion. A gap ends the alignment.
+  void feed_motion(GpsTime until) {
+    while (!samples_.empty() && (samples_.front().time <= until || !bound_.motion().covers(until))) {
+      const Status s = bound_.motion().add_sample(samples_.front());
+      if (!s.ok() && s.code != StatusCode::duplicate && s.code != StatusCode::out_of_order) return lose_alignment();
+      last_sample_ = samples_.front();
+      samples_.pop();
+    }
+  }
+
+  void feed_initializer(GpsTime until) {
+    while (!samples_.empty() && samples_.front().time <= until) {
+      last_sample_ = samples_.front();
+      (void)detector_.add(last_sample_);
+      (void)initializer_.add_imu(last_sample_, detector_.stationary());
+      samples_.pop();
+    }
+  }
+
+  /// Aligns with the GNSS solution of an epoch, and starts the inertial window when that is done.
+  void align(const RtkSolution& s) {
+    if (!has_frame_) frame_ = geodesy::LocalFrame::at(s.position_e_m), has_frame_ = true;
+    const Earth earth{frame_};
+    const Eigen::Vector3d p_w_m = frame_.to_local(s.position_e_m), v_w_mps = frame_.R_ew.transpose() * s.velocity_e_mps;
+    (void)initializer_.set_local_gravity(earth.gravity_w_mps2(p_w_m), imu::RotatingEarth{frame_}.rate_w_radps());
+    const double sigma_v = std::sqrt(std::max(1e-4, s.velocity_covariance_enu.trace() / 3));
+    if (s.status != SolutionStatus::dr) {
+      (void)initializer_.add_velocity(s.time, v_w_mps, sigma_v);
+      detector_.set_speed_hint(s.time, v_w_mps.norm(), sigma_v);
+    }
+    if (s.status == SolutionStatus::fix || s.status == SolutionStatus::float_)
+      (void)initializer_.add_position(s.time, p_w_m, std::sqrt(std::max(1e-4, s.covariance_enu_m2.topLeftCorner<2, 2>().trace() / 2)));
+    if (initializer_.state() != imu::AlignmentState::aligned) return;
+    const double late_s = seconds_between(last_sample_.time, s.time);  // the alignment is of the last reading
+    const Eigen::Matrix3d room = Eigen::Matrix3d::Identity() * 0.01;
+    const auto alignment = initializer_.alignment(p_w_m - late_s * v_w_mps, 4 * s.covariance_enu_m2 + room);
+    if (!alignment.ok()) return;
+    bound_.begin_at(alignment->state, alignment->covariance, alignment->time, frame_);
+    (void)bound_.motion().add_sample(last_sample_);
+    aligned_ = true, ++alignments_;
+    restarts_ = 0;
+  }
+
+  /// Counts windows that were given up.
+  void watch(const RtkSolution& s) {
+    if (!s.restarted) return;
+    restarts_ = restarts_ > 0 && seconds_between(last_restart_, s.time) < options_.realign_within_s ? restarts_ + 1 : 1;
+    last_restart_ = s.time;
+    if (restarts_ > options_.restarts_to_realign) lose_alignment();
+  }
+
+  void lose_alignment() {
+    aligned_ = false;
+    initializer_ = imu::Initializer{initializer_settings(options_)};
+    detector_ = stationary::Detector{options_.inertial.preintegration.noise, options_.inertial.detector};
+  }
+
+  Options options_;
+  Free free_;
+  Bound bound_;
+  imu::Initializer initializer_;
+  stationary::Detector detector_;
+  geodesy::LocalFrame frame_{};
+  RingBuffer<imu::ImuSample, 8192> samples_{};
+  RingBuffer<gnss::ObservationEpoch, 16> epochs_{};
+  gnss::ObservationEpoch epoch_{};
+  imu::ImuSample last_sample_{};
+  GpsTime newest_imu_{}, newest_rover_{}, newest_input_{}, answered_{}, last_restart_{};
+  bool has_imu_{false}, has_rover_{false}, has_input_{false}, has_answered_{false}, has_frame_{false}, aligned_{false}, finished_{false};
+  int alignments_{0}, restarts_{0};
+};
+
+}  // namespace searvins::estimator

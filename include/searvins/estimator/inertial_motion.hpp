@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// \file
+/// The motion of an estimator with an inertial unit: navigation states tied by preintegrated readings, and held when the vehicle stands.
+///
+/// Between states the policy integrates what add_sample() brings; a state may be placed wherever readings reach (covers()). While the detector sees a
+/// rest, each state gets a zero velocity and a zero angular rate, unless the state's own prediction says that the vehicle moves.
+///
+/// The antenna of a state is a lever arm away and swings with the body (imu/lever_arm.hpp). Its covariance follows from that of the state by the
+/// Jacobians of both.
+#pragma once
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include <searvins/core/static_vector.hpp>
+#include <searvins/core/status.hpp>
+#include <searvins/core/time.hpp>
+#include <searvins/estimator/rtk_options.hpp>
+#include <searvins/estimator/rtk_solution.hpp>
+#include <searvins/geodesy/local_frame.hpp>
+#include <searvins/imu/earth.hpp>
+#include <searvins/imu/imu_factor.hpp>
+#include <searvins/imu/imu_sample.hpp>
+#include <searvins/imu/lever_arm.hpp>
+#include <searvins/imu/navigation_prior.hpp>
+#include <searvins/imu/navigation_state.hpp>
+#include <searvins/imu/prediction.hpp>
+#include <searvins/imu/preintegration.hpp>
+#include <searvins/stationary/detector.hpp>
+#include <searvins/stationary/stationary_factors.hpp>
+
+namespace searvins::estimator {
+
+/// Settings of the inertial part.
+struct InertialOptions {
+  imu::PreintegrationOptions preintegration{};
+  Eigen::Vector3d lever_arm_b_m{Eigen::Vector3d::Zero()};  ///< from the unit to the antenna's phase centre
+  stationary::DetectorSettings detector{};
+  bool zero_velocity{true}, zero_angular_rate{true};       ///< hold states at rest
+  double zero_velocity_sigma_mps{0.03}, zero_rate_sigma_radps{1e-3};
+  double max_rest_speed_sigmas{3};                         ///< a rest is not believed when the prediction moves faster than this, and than
+  double max_rest_speed_mps{0.3};                          ///< this speed
+  bool non_holonomic{false};                               ///< no sliding of the point below, for wheeled vehicles
+  Eigen::Vector3d axle_b_m{Eigen::Vector3d::Zero()};       ///< middle of the axle that does not steer
+  double non_holonomic_sigma_mps{0.1};
+  double non_holonomic_from_mps{1};                        ///< slower, the direction of travel is not the body's
+};
+
+/// See the file comment. `SampleCapacity`: readings between two states.
+template <class Earth = imu::RotatingEarth, std::size_t SampleCapacity = 8192>
+class InertialMotion {
+ public:
+  static constexpr bool is_inertial = true;
+  using State = imu::NavigationState;
+  using Antenna = imu::LeverArm;
+  using Options = InertialOptions;
+  using Covariance = imu::NavigationCovariance;
+  template <class Cap>
+  using Variables = smoother::Types<>;
+  template <class Cap>
+  using Factors = smoother::Types<smoother::Capacity<imu::NavigationPriorFactor, 1>, smoother::Capacity<imu::ImuFactor<Earth>, Cap::states>,
+                                  smoother::Capacity<stationary::ZeroVelocityFactor, Cap::states>, smoother::Capacity<stationary::ZeroAngularRateFactor, Cap::states>,
+                                  smoother::Capacity<stationary::NonHolonomicFactor, Cap::states>>;
+
+  explicit InertialMotion(const RtkOptions&, const Options& options = {}) : options_(options), detector_(options.preintegration.noise, options.detector) {}
+
+  void set_frame(const geodesy::LocalFrame& frame) { earth_ = Earth{frame}; }
+  [[nodiscard]] const Options& options() const { return options_; }
+  [[nodiscard]] const Earth& earth() const { return earth_; }
+  [[nodiscard]] const stationary::Detector& detector() const { return detector_; }
+
+  /// The next reading. Errors: those of imu::Preintegration::push; nothing was changed then.
+  Status add_sample(const imu::ImuSample& sample) {
+    if (const Status s = integration_.push(sample); !s.ok()) return s;
+    (void)detector_.add(sample);  // its gaps and repeats were refused above
+    if (recent_.full()) recent_.erase(0);
+    (void)recent_.push_back(sample);
+    return ok_status();
+  }
+  /// Whether a state may be placed at `t`.
+  [[nodiscard]] bool covers(GpsTime t) const { return integration_.newest_time() >= t && integration_.size() >= 2; }
+
+  [[nodiscard]] Antenna antenna_at(GpsTime t) const { return {options_.lever_arm_b_m, gyro_at(t), earth_.rate_w_radps()}; }
+
+  [[nodiscard]] Result<State> predict(const State& x, GpsTime, GpsTime to) const {
+    const auto motion = integration_.until(to);
+    if (!motion.ok()) return motion.status();
+    return imu::predict(x, *motion, earth_);
+  }
+  /// That of `x` itself where readings do not reach.
+  [[nodiscard]] Covariance predicted_covariance(const State& x, const Covariance& P, GpsTime, GpsTime to) const {
+    const auto motion = integration_.until(to);
+    return motion.ok() ? imu::predict_covariance(x, P, *motion, options_.preintegration.noise, earth_) : P;
+  }
+  /// Covariance of the antenna's position and velocity in w.
+  [[nodiscard]] static Eigen::Matrix<double, 6, 6> antenna_covariance(const State& x, const Covariance& P, const Antenna& antenna) {
+    Eigen::Matrix<double, 6, 15> J;
+    typename Antenna::Jacobian rows;
+    (void)antenna.position_w_m(x, &rows);
+    J.topRows<3>() = rows;
+    (void)antenna.velocity_w_mps(x, &rows);
+    J.bottomRows<3>() = rows;
+    const Eigen::Matrix<double, 6, 15> JP = J.lazyProduct(P);
+    return JP.lazyProduct(J.transpose());
+  }
+
+  /// The predicted state moved so that its antenna is at p; its velocity is the prediction's, which no single epoch knows better.
+  [[nodiscard]] State placed(const State& predicted, const Antenna& antenna, const Eigen::Vector3d& p_wa_m, const Eigen::Vector3d&) const {
+    State x = predicted;
+    x.p_wb_m += p_wa_m - antenna.position_w_m(predicted);
+    return x;
+  }
+  /// A covariance after the window was given up: position, velocity and attitude may be wrong.
+  [[nodiscard]] static Covariance widened(const Covariance& P, double sigma_position_m) {
+    Covariance wide = P;
+    for (int i = 0; i < 3; ++i) {
+      wide(State::position + i, State::position + i) += sigma_position_m * sigma_position_m;
+      wide(State::velocity + i, State::velocity + i) += 1;
+      wide(State::attitude + i, State::attitude + i) += 0.03 * 0.03;
+    }
+    return wide;
+  }
+
+  template <class Smoother>
+  Status add_start(Smoother& smoother, smoother::Key<State> key, const State& start, const Covariance& P) const {
+    const auto prior = imu::NavigationPriorFactor::make(key, start, P);
+    return prior.ok() ? smoother.add_factor(*prior).status() : prior.status();
+  }
+
+  template <class Smoother>
+  Status add_link(Smoother& smoother, smoother::Key<State> from, smoother::Key<State> to, GpsTime, GpsTime to_time, RtkSolution& out) {
+    const auto motion = integration_.until(to_time);
+    if (!motion.ok()) return motion.status();
+    const auto factor = imu::ImuFactor<Earth>::make(from, to, *motion, options_.preintegration.noise, earth_, smoother.find(from)->p_wb_m);
+    if (!factor.ok()) return factor.status();
+    if (const Status s = smoother.add_factor(*factor).status(); !s.ok()) return s;
+    out.stationary = is_at_rest(*smoother.find(to));
+    if (out.stationary) hold(smoother, to);
+    if (options_.non_holonomic && !out.stationary && smoother.find(to)->v_wb_mps.norm() > options_.non_holonomic_from_mps) keep_on_wheels(smoother, to, to_time);
+    return ok_status();
+  }
+
+  /// The newest state was estimated: the next interval begins there.
+  void settle(const State& x, const Covariance& P, GpsTime t) {
+    sigma_velocity_mps_ = std::sqrt(std::max(1e-6, P.block<3, 3>(State::velocity, State::velocity).trace() / 3));
+    if (!integration_.restart(t, imu::bias_of(x)).ok()) (void)integration_.start(t, imu::bias_of(x), options_.preintegration);
+    detector_.set_speed_hint(t, x.v_wb_mps.norm(), sigma_velocity_mps_);
+    if (P.block<3, 3>(State::gyro_bias, State::gyro_bias).trace() < 3e-6) detector_.set_gyro_bias(x.gyro_bias_b_radps);
+  }
+
+  /// Attitude and biases. R_nw: axes of w to East-North-Up at the position.
+  void describe(const State& x, const Covariance& P, const Eigen::Matrix3d& R_nw, RtkSolution& out) const {
+    out.has_attitude = true;
+    out.R_nb = R_nw * x.R_wb;
+    const Eigen::Matrix3d C = out.R_nb * P.topLeftCorner<3, 3>() * out.R_nb.transpose();
+    out.attitude_sigma_rad = C.diagonal().cwiseMax(0).cwiseSqrt();
+    out.accel_bias_b_mps2 = x.accel_bias_b_mps2, out.gyro_bias_b_radps = x.gyro_bias_b_radps;
+  }
+
+ private:
+  /// The reading nearest to a time.
+  [[nodiscard]] Eigen::Vector3d gyro_at(GpsTime t) const {
+    Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
+    double nearest_s = 1e9;
+    for (const imu::ImuSample& s : recent_) {
+      const double away_s = std::abs(seconds_between(s.time, t));
+      if (away_s < nearest_s) nearest_s = away_s, gyro = s.gyro_b_radps;
+    }
+    return gyro;
+  }
+
+  [[nodiscard]] bool is_at_rest(const State& predicted) const {
+    const double speed = predicted.v_wb_mps.norm();
+    return detector_.stationary() && speed < std::max(options_.max_rest_speed_mps, options_.max_rest_speed_sigmas * sigma_velocity_mps_);
+  }
+  template <class Smoother>
+  void hold(Smoother& smoother, smoother::Key<State> key) const {
+    if (options_.zero_velocity) (void)smoother.add_factor(stationary::ZeroVelocityFactor{key, options_.zero_velocity_sigma_mps});
+    if (options_.zero_angular_rate)
+      (void)smoother.add_factor(stationary::ZeroAngularRateFactor{key, detector_.mean_gyro_b_radps(), earth_.rate_w_radps(), options_.zero_rate_sigma_radps});
+  }
+  template <class Smoother>
+  void keep_on_wheels(Smoother& smoother, smoother::Key<State> key, GpsTime t) const {
+    stationary::NonHolonomicFactor f;
+    f.state = key;
+    f.gyro_b_radps = gyro_at(t), f.earth_rate_w_radps = earth_.rate_w_radps(), f.point_b_m = options_.axle_b_m;
+    f.sigma_lateral_mps = f.sigma_vertical_mps = options_.non_holonomic_sigma_mps;
+    (void)smoother.add_factor(f);
+  }
+
+  Options options_;
+  Earth earth_{};
+  imu::Preintegration<double, SampleCapacity> integration_{};
+  stationary::Detector detector_;
+  StaticVector<imu::ImuSample, 16> recent_{};
+  double sigma_velocity_mps_{1};
+};
+
+}  // namespace searvins::estimator
