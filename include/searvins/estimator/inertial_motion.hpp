@@ -43,6 +43,9 @@ struct InertialOptions {
   double zero_velocity_sigma_mps{0.03}, zero_rate_sigma_radps{1e-3};
   double max_rest_speed_sigmas{3};                         ///< a rest is not believed when the prediction moves faster than this, and than
   double max_rest_speed_mps{0.3};                          ///< this speed
+  /// Integers that would move the antenna further than this from its prediction are not believed, and neither are those that the prediction rests on:
+  /// chi-square of 3, the prediction's covariance widened by the floor on each axis.
+  double max_fix_jump_statistic{25}, fix_jump_floor_m{0.02};
   bool non_holonomic{false};                               ///< no sliding of the point below, for wheeled vehicles
   Eigen::Vector3d axle_b_m{Eigen::Vector3d::Zero()};       ///< middle of the axle that does not steer
   double non_holonomic_sigma_mps{0.1};
@@ -122,6 +125,14 @@ class InertialMotion {
       wide(State::attitude + i, State::attitude + i) += 0.03 * 0.03;
     }
     return wide;
+  }
+
+  /// Whether integers that put the antenna at `fixed` agree with its prediction, both in w with their covariances.
+  [[nodiscard]] bool agrees(const Eigen::Vector3d& fixed_w_m, const Eigen::Matrix3d& fixed_m2, const Eigen::Vector3d& predicted_w_m,
+                            const Eigen::Matrix3d& predicted_m2) const {
+    const Eigen::Matrix3d S = fixed_m2 + predicted_m2 + options_.fix_jump_floor_m * options_.fix_jump_floor_m * Eigen::Matrix3d::Identity();
+    const auto root = imu::square_root_information<3>(S);
+    return root.ok() && (*root * (fixed_w_m - predicted_w_m)).squaredNorm() <= options_.max_fix_jump_statistic;
   }
 
   template <class Smoother>

@@ -698,8 +698,14 @@ class RtkEstimator {
 
   void resolve(RtkSolution& out, StaticVector<smoother::Key<gnss::IntegerFix>, kPhasesSize>& fresh) {
     resolver_.resolve(float_, options_.resolution, outcome_);
-    out.verdict = outcome_.verdict, out.success_rate = outcome_.success_rate, out.ratio = outcome_.ratio;
+    out.verdict = outcome_.verdict, out.success_rate = outcome_.success_rate, out.ratio = outcome_.ratio, out.innovation_enu_m = outcome_.innovation_m;
     if (!outcome_.accepted()) return;
+    if (!agrees_with_prediction()) {  // new or held integers are wrong: neither are believed
+      out.verdict = ambiguity::ResolutionVerdict::innovation;
+      out.released_integers += static_cast<int>(held_.size());
+      release_all();
+      return;
+    }
     for (int i = 0; i < float_.n; ++i) {
       if (!outcome_.fixed[at(i)]) continue;
       const Difference& d = differences_[at(i)];
@@ -710,6 +716,14 @@ class RtkEstimator {
       (void)fresh.push_back(key);
       ++out.fixed_phases;
     }
+  }
+
+  [[nodiscard]] bool agrees_with_prediction() const {
+    if (!is_predicted_) return true;
+    const State& x = *smoother_.find(nodes_.back().state);
+    const auto P = Motion::antenna_covariance(predicted_, predicted_covariance_, antenna_);
+    return motion_.agrees(antenna_.position_w_m(x) + outcome_.innovation_m, outcome_.covariance_m2, antenna_.position_w_m(predicted_),
+                          P.template topLeftCorner<3, 3>());
   }
 
   /// Takes out integers of earlier epochs that the float without them contradicts.

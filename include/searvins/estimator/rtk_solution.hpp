@@ -44,6 +44,7 @@ struct RtkSolution {
   double base_age_s{std::numeric_limits<double>::quiet_NaN()};
   ambiguity::ResolutionVerdict verdict{ambiguity::ResolutionVerdict::too_few};
   double success_rate{0}, ratio{0};
+  Eigen::Vector3d innovation_enu_m{Eigen::Vector3d::Zero()};  ///< how far the last integers that were tried would move the float
   double code_weight{0}, phase_weight{0};  ///< mean robust weights of this epoch's rows, 0 without rows
   double code_scale{1}, phase_scale{1};  ///< learned factors on the sigmas of code and phase
   int held_integers{0};     ///< integer constraints in the window after this epoch
