@@ -66,6 +66,7 @@
 #include <searvins/imu/motion_accumulator.hpp>
 #include <searvins/imu/navigation_prior.hpp>
 #include <searvins/imu/navigation_state.hpp>
+#include <searvins/imu/position_factor.hpp>
 #include <searvins/imu/position_fix.hpp>
 #include <searvins/imu/prediction.hpp>
 #include <searvins/imu/preintegrated_motion.hpp>

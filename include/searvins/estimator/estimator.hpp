@@ -6,6 +6,7 @@
 ///
 ///     before alignment   GNSS alone (RtkEstimator<FreeMotion>); its velocities and positions align the unit (imu/initializer.hpp)
 ///     aligned            navigation states, tightly coupled (RtkEstimator<InertialMotion>)
+///     positions          instead of rover epochs: loosely coupled to another program's positions
 ///     no rover epoch     states from the inertial unit alone, every silence_s, labelled dr
 ///     readings missing   GNSS alone again, until readings are back and aligned
 ///
@@ -31,6 +32,7 @@
 #include <searvins/geodesy/local_frame.hpp>
 #include <searvins/imu/imu_sample.hpp>
 #include <searvins/imu/initializer.hpp>
+#include <searvins/imu/position_fix.hpp>
 #include <searvins/stationary/detector.hpp>
 
 namespace searvins::estimator {
@@ -97,6 +99,16 @@ class Estimator {
     see(epoch.tag);
     return ok_status();
   }
+  /// A position of the antenna from another program or receiver (loose coupling), in time order. Errors: duplicate, out_of_order, capacity_exceeded.
+  Status add_position(const imu::PositionFix& fix) {
+    if (!fix.position_e_m.allFinite() || !fix.covariance_e_m2.allFinite()) return failure(StatusCode::non_finite, "position or its covariance is not finite");
+    if (has_rover_ && fix.time <= newest_rover_) return failure(fix.time == newest_rover_ ? StatusCode::duplicate : StatusCode::out_of_order, "position not after the last one");
+    if (has_answered_ && fix.time <= answered_) return failure(StatusCode::out_of_order, "position later than the declared latency");
+    if (!positions_.push(fix)) return failure(StatusCode::capacity_exceeded, "positions wait for next(): take solutions more often");
+    has_rover_ = true, newest_rover_ = fix.time;
+    see(fix.time);
+    return ok_status();
+  }
   /// No more input will come: what waits is due.
   void finish() { finished_ = true; }
 
@@ -107,6 +119,11 @@ class Estimator {
       epoch_ = epochs_.front();
       epochs_.pop();
       return answer(solve(epoch_));
+    }
+    if (!positions_.empty() && is_due(positions_.front().time)) {
+      const imu::PositionFix fix = positions_.front();
+      positions_.pop();
+      return answer(solve(fix));
     }
     if (is_silent()) return answer(bridge());
     return failure(StatusCode::no_data, "no solution is due");
@@ -130,6 +147,7 @@ class Estimator {
   [[nodiscard]] const Free& gnss_only() const { return free_; }
 
  private:
+  static constexpr double kNoVelocityMps = 1e3;  ///< sigma of a velocity that there is none of
   static constexpr double kClockMarginS = 0.03;  ///< a state's time lies this much around its epoch's tag
 
   /// With an inertial unit two satellites are worth differencing, and a window does not end with a gap.
@@ -154,7 +172,7 @@ class Estimator {
   }
   /// Readings reach further than a rover epoch may still be missing for.
   [[nodiscard]] bool is_silent() const {
-    if (!aligned_ || !epochs_.empty()) return false;
+    if (!aligned_ || !epochs_.empty() || !positions_.empty()) return false;
     const GpsTime next = bound_.state_time().plus_seconds(options_.silence_s);
     return has_imu_ && newest_imu_ >= next.plus_seconds(finished_ ? 0.0 : options_.latency_s);
   }
@@ -179,6 +197,37 @@ class Estimator {
     const Result<RtkSolution> solution = free_.update(epoch);
     if (solution.ok() && has_imu_) align(*solution);
     return solution;
+  }
+
+  /// The same for a position from elsewhere. Before alignment it is the solution.
+  [[nodiscard]] Result<RtkSolution> solve(const imu::PositionFix& fix) {
+    if (aligned_) {
+      feed_motion(fix.time);
+      if (aligned_ && bound_.motion().covers(fix.time)) {
+        const Result<RtkSolution> solution = bound_.advance_to(fix);
+        if (solution.ok()) watch(*solution);
+        return solution;
+      }
+      lose_alignment();
+    }
+    feed_initializer(fix.time);
+    const RtkSolution solution = solution_of(fix);
+    if (has_imu_) align(solution);
+    return solution;
+  }
+
+  [[nodiscard]] static RtkSolution solution_of(const imu::PositionFix& fix) {
+    RtkSolution s;
+    s.tag = s.time = fix.time;
+    s.status = Bound::status_of_quality(fix.quality);
+    s.position_e_m = fix.position_e_m;
+    s.satellites = std::max(0, fix.satellites);
+    const Eigen::Matrix3d R = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(fix.position_e_m)).transpose();
+    s.covariance_enu_m2 = R * fix.covariance_e_m2 * R.transpose();
+    const double sigma_v = fix.has_velocity() ? fix.sigma_velocity_mps : kNoVelocityMps;
+    if (fix.has_velocity()) s.velocity_e_mps = fix.velocity_e_mps;
+    s.velocity_covariance_enu = Eigen::Matrix3d::Identity() * sigma_v * sigma_v;
+    return s;
   }
 
   /// A state from the readings alone.
@@ -216,7 +265,7 @@ class Estimator {
     const Eigen::Vector3d p_w_m = frame_.to_local(s.position_e_m), v_w_mps = frame_.R_ew.transpose() * s.velocity_e_mps;
     (void)initializer_.set_local_gravity(earth.gravity_w_mps2(p_w_m), imu::RotatingEarth{frame_}.rate_w_radps());
     const double sigma_v = std::sqrt(std::max(1e-4, s.velocity_covariance_enu.trace() / 3));
-    if (s.status != SolutionStatus::dr) {
+    if (s.status != SolutionStatus::dr && sigma_v < kNoVelocityMps) {
       (void)initializer_.add_velocity(s.time, v_w_mps, sigma_v);
       detector_.set_speed_hint(s.time, v_w_mps.norm(), sigma_v);
     }
@@ -255,6 +304,7 @@ class Estimator {
   geodesy::LocalFrame frame_{};
   RingBuffer<imu::ImuSample, 8192> samples_{};
   RingBuffer<gnss::ObservationEpoch, 16> epochs_{};
+  RingBuffer<imu::PositionFix, 64> positions_{};
   gnss::ObservationEpoch epoch_{};
   imu::ImuSample last_sample_{};
   GpsTime newest_imu_{}, newest_rover_{}, newest_input_{}, answered_{}, last_restart_{};

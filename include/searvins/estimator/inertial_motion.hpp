@@ -27,6 +27,8 @@
 #include <searvins/imu/lever_arm.hpp>
 #include <searvins/imu/navigation_prior.hpp>
 #include <searvins/imu/navigation_state.hpp>
+#include <searvins/imu/position_factor.hpp>
+#include <searvins/imu/position_fix.hpp>
 #include <searvins/imu/prediction.hpp>
 #include <searvins/imu/preintegration.hpp>
 #include <searvins/stationary/detector.hpp>
@@ -39,6 +41,7 @@ struct InertialOptions {
   imu::PreintegrationOptions preintegration{};
   Eigen::Vector3d lever_arm_b_m{Eigen::Vector3d::Zero()};  ///< from the unit to the antenna's phase centre
   stationary::DetectorSettings detector{};
+  double position_floor_m{0.05};                           ///< sigma that is added to positions from elsewhere
   bool zero_velocity{true}, zero_angular_rate{true};       ///< hold states at rest
   double zero_velocity_sigma_mps{0.03}, zero_rate_sigma_radps{1e-3};
   double max_rest_speed_sigmas{3};                         ///< a rest is not believed when the prediction moves faster than this, and than
@@ -66,7 +69,7 @@ class InertialMotion {
   template <class Cap>
   using Factors = smoother::Types<smoother::Capacity<imu::NavigationPriorFactor, 1>, smoother::Capacity<imu::ImuFactor<Earth>, Cap::states>,
                                   smoother::Capacity<stationary::ZeroVelocityFactor, Cap::states>, smoother::Capacity<stationary::ZeroAngularRateFactor, Cap::states>,
-                                  smoother::Capacity<stationary::NonHolonomicFactor, Cap::states>>;
+                                  smoother::Capacity<stationary::NonHolonomicFactor, Cap::states>, smoother::Capacity<imu::PositionFactor, Cap::states>>;
 
   explicit InertialMotion(const RtkOptions&, const Options& options = {}) : options_(options), detector_(options.preintegration.noise, options.detector) {}
 
@@ -152,6 +155,15 @@ class InertialMotion {
     if (out.stationary) hold(smoother, to);
     if (options_.non_holonomic && !out.stationary && smoother.find(to)->v_wb_mps.norm() > options_.non_holonomic_from_mps) keep_on_wheels(smoother, to, to_time);
     return ok_status();
+  }
+
+  /// Adds a position from elsewhere to a state.
+  template <class Smoother>
+  Status add_position(Smoother& smoother, smoother::Key<State> key, const imu::PositionFix& fix, const Antenna& antenna) const {
+    const Eigen::Matrix3d& R_ew = earth_.frame.R_ew;
+    const auto factor = imu::PositionFactor::make(key, antenna, earth_.frame.to_local(fix.position_e_m), R_ew.transpose() * fix.covariance_e_m2 * R_ew,
+                                                  options_.position_floor_m);
+    return factor.ok() ? smoother.add_factor(*factor).status() : factor.status();
   }
 
   /// The newest state was estimated: the next interval begins there.

@@ -91,24 +91,24 @@ class RtkEstimator {
     return out;
   }
 
-  /// A state without GNSS at a time after the last one, where the motion policy carries the window on. Errors: no_data (it does not, or there is no
-  /// state yet), out_of_order, and those of the motion (IMU coverage); nothing was changed then.
+  /// A state without GNSS observations at a time after the last one, where the motion policy carries the window on. Errors: no_data (it does not, or
+  /// there is no state yet), out_of_order, and those of the motion (IMU coverage); nothing was changed then.
   Result<RtkSolution> advance(GpsTime time) {
-    if (!goes_on_without_gnss()) return failure(StatusCode::no_data, "nothing carries the window on without GNSS");
-    if (time <= last_time_) return failure(StatusCode::out_of_order, "a state not after the last one");
-    if (const auto x = motion_.predict(last_state_, last_time_, time); !x.ok()) return x.status();
-    RtkSolution out;
-    out.tag = out.time = time;
-    out.clock_offset_s = clock_offset_s_;
-    single_point_ = {};
-    predict(failure(StatusCode::no_data, "no rover epoch"), out);
-    drop_differences(), epoch_.doppler.clear(), epoch_.doppler_pivot = -1;
-    continuation_.skip_epoch();
-    if (extend(out))
-      estimate(out);
-    else
-      without_differences(failure(StatusCode::no_data, "no rover epoch"), out);
-    return out;
+    return advance_with(time, [](smoother::Key<State>, RtkSolution&) {});
+  }
+  /// The same with a position from elsewhere (a type that the motion policy takes) at its time. Loose coupling; the status is the fix's.
+  template <class Fix>
+  Result<RtkSolution> advance_to(const Fix& fix) {
+    return advance_with(fix.time, [&](smoother::Key<State> state, RtkSolution& out) {
+      const Status s = motion_.add_position(smoother_, state, fix, antenna_);
+      out.smoother_status = s;
+      if (s.ok()) out.status = status_of_quality(fix.quality), out.satellites = std::max(0, fix.satellites);
+    });
+  }
+
+  /// RTKLIB's quality numbers.
+  [[nodiscard]] static SolutionStatus status_of_quality(int quality) {
+    return quality == 1 ? SolutionStatus::fix : quality == 2 ? SolutionStatus::float_ : quality == 3 || quality == 4 ? SolutionStatus::dgnss : SolutionStatus::spp;
   }
 
   /// Starts from a known state (an alignment) in a frame; a window that is running is dropped.
@@ -182,6 +182,29 @@ class RtkEstimator {
   };
 
   [[nodiscard]] bool window_running() const { return !nodes_.empty(); }
+
+  template <class AddMeasurement>
+  Result<RtkSolution> advance_with(GpsTime time, AddMeasurement add_measurement) {
+    if (!goes_on_without_gnss()) return failure(StatusCode::no_data, "nothing carries the window on without GNSS");
+    if (time <= last_time_) return failure(StatusCode::out_of_order, "a state not after the last one");
+    if (const auto x = motion_.predict(last_state_, last_time_, time); !x.ok()) return x.status();
+    RtkSolution out;
+    out.tag = out.time = time;
+    out.clock_offset_s = clock_offset_s_;
+    single_point_ = {};
+    predict(failure(StatusCode::no_data, "no rover epoch"), out);
+    drop_differences(), epoch_.doppler.clear(), epoch_.doppler_pivot = -1;
+    continuation_.skip_epoch();
+    if (extend(out)) {
+      add_measurement(nodes_.back().state, out);
+      const SolutionStatus measured = out.status;
+      estimate(out);
+      if (out.status == SolutionStatus::dr) out.status = nodes_.empty() ? SolutionStatus::dr : measured;
+    } else {
+      without_differences(failure(StatusCode::no_data, "no rover epoch"), out);
+    }
+    return out;
+  }
 
   // ---- begin: time and prediction --------------------------------------------------------------------------------------------------------
 
