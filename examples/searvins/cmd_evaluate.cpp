@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "examples/searvins/commands.hpp"
+#include "examples/support/compare_report.hpp"
 #include "examples/support/evaluation.hpp"
 #include "examples/support/evaluation_tables.hpp"
 #include "examples/support/load_trajectory.hpp"
@@ -21,6 +22,7 @@ OptionParser evaluate_parser() {
   parser.value("start", "SOW", "first second of week to score");
   parser.value("end", "SOW", "last second of week to score");
   parser.value("step", "S", "interval of the evaluation epochs, seconds").fallback("1");
+  parser.value("report", "FILE", "a page that lays the runs over one another: tracks, errors over time, distributions");
   parser.positionals("RUN", "folder of a run, trajectory.csv, or RTKLIB .pos file", 1);
   parser.epilogue(
       "Rules: truth rows on multiples of the step are the epochs; the nearest row within half a step is scored at its own time\n"
@@ -31,6 +33,13 @@ OptionParser evaluate_parser() {
 int unusable(const io::Diagnostic& error) {
   std::fprintf(stderr, "searvins evaluate: %s\n", io::to_string(error).c_str());
   return kExitUnusableInput;
+}
+
+/// "a, b and c".
+std::string title_of(const std::vector<NamedEvaluation>& runs) {
+  std::string text;
+  for (std::size_t i = 0; i < runs.size(); ++i) text += (i == 0 ? "" : i + 1 == runs.size() ? " and " : ", ") + runs[i].name;
+  return text;
 }
 
 }  // namespace
@@ -47,6 +56,7 @@ int run_evaluate(int argc, const char* const* argv) {
   if (const auto code = options.finished()) return *code;
 
   std::vector<NamedEvaluation> runs;
+  Comparison comparison;
   for (const std::string& given : options.positionals()) {
     const io::FileResult<LoadedTrajectory> loaded = load_trajectory(given);
     if (!loaded) return unusable(loaded.error());
@@ -59,9 +69,19 @@ int run_evaluate(int argc, const char* const* argv) {
       error.file = point.empty() ? options.text("truth") : given;
       return unusable(error);
     }
+    if (options.given("report")) comparison.runs.push_back({loaded->name, loaded->rows, *evaluation});
     runs.push_back({loaded->name, std::move(evaluation).value()});
   }
   std::fputs(evaluation_text(runs).c_str(), stdout);
+  if (options.given("report")) {
+    const std::string path = options.text("report");
+    comparison.title = title_of(runs);
+    comparison.command = "searvins evaluate";
+    for (int i = 1; i < argc; ++i) (comparison.command += ' ') += argv[i];
+    if (const std::string wrong = io::write_text_file(path, compare_html(comparison)); !wrong.empty())
+      return unusable({path, 0, wrong, "choose another file with --report"});
+    std::printf("\nreport: %s\n", path.c_str());
+  }
   return kExitDone;
 }
 

@@ -15,16 +15,17 @@ namespace {
 struct LaterOption {
   const char *name, *value_name;
 };
-constexpr LaterOption kLaterOptions[] = {
-    {"imu", "FILE"}, {"tracks", "FILE"}, {"images", "DIR"}, {"positions", "FILE"}, {"dataset", "KIND"}};
+constexpr LaterOption kLaterOptions[] = {{"tracks", "FILE"}, {"images", "DIR"}, {"positions", "FILE"}, {"dataset", "KIND"}};
 
 OptionParser solve_parser() {
-  OptionParser parser{"searvins solve", "positions of a GNSS antenna from recorded observations"};
+  OptionParser parser{"searvins solve", "positions of a GNSS antenna, alone or with an inertial unit, from recordings"};
   parser.value("rover", "FILE", "RINEX observation file of the moving receiver").required();
   parser.value("base", "FILE", "RINEX observation file of the base station; without it single points are computed");
   parser.value("nav", "FILE", "RINEX navigation file").required().repeated();
   parser.value("out", "DIR", "folder for the results, made when it is missing").required();
-  parser.value("rig", "FILE", "rig.json: signals, sigmas, base position");
+  parser.value("rig", "FILE", "rig.json: signals, sigmas, base position, inertial unit, lever arm");
+  parser.value("imu", "FILE", "log of the inertial unit that --rig describes: tightly coupled, a solution through outages");
+  parser.value("heading", "DEG[,SIGMA]", "heading at the start, clockwise from north, and its sigma; else found from the motion");
   parser.value("base-ecef", "X,Y,Z", "antenna of the base, ECEF metres; else the rig's, else that of the base file's header");
   parser.value("robust", "FORM", "robust formulation").fallback(kDefaultFormulation).one_of({"batch", "scalar", "latent", "symmetric"});
   parser.value("ambiguity", "MODE", "integer resolution").fallback("partial").one_of({"full", "partial", "float"});
@@ -44,8 +45,8 @@ OptionParser solve_parser() {
   parser.value("end", "SOW", "last second of week to solve");
   parser.value("truth", "FILE", "reference trajectory: errors are computed and shown");
   parser.value("truth-ecef", "X,Y,Z", "reference point of an antenna that does not move, ECEF metres");
-  parser.value("rate", "WHAT", "rows to write: gnss is all that this version has").fallback("gnss");
-  for (const LaterOption& later : kLaterOptions) parser.value(later.name, later.value_name, "not in this version, which solves GNSS only");
+  parser.value("rate", "WHAT", "rows to write: one a rover epoch, or also one an IMU reading").fallback("gnss");
+  for (const LaterOption& later : kLaterOptions) parser.value(later.name, later.value_name, "not in this version, which solves GNSS and IMU");
   parser.epilogue(
       "Written: trajectory.csv, trajectory_lagged.csv, solution.pos (RTKPLOT), trajectory.kml, trajectory_tum.txt (evo), summary.json, "
       "report.html.\nExit codes: 0 done, 2 usage, 3 unusable input, 4 the run ended without a solution.");
@@ -69,9 +70,34 @@ void take_signals(Options& options, SolveRequest& request) {
 
 void refuse_later_options(Options& options) {
   for (const LaterOption& later : kLaterOptions)
-    if (options.given(later.name)) options.fail(std::string{"--"} + later.name + ": this version solves GNSS only; leave the option out");
-  if (options.text("rate") != "gnss")
-    options.fail("--rate " + options.text("rate") + ": this version solves GNSS only, at the rate of the rover");
+    if (options.given(later.name))
+      options.fail(std::string{"--"} + later.name + ": this version solves GNSS and IMU only; leave the option out");
+  const std::string rate = options.text("rate");
+  if (rate == "camera")
+    options.fail("--rate camera: this version has no cameras; use gnss or imu");
+  else if (rate != "gnss" && rate != "imu")
+    options.fail("--rate: '" + rate + "' is none of gnss, imu");
+}
+
+/// Options of the inertial unit, and what each of them needs.
+void take_imu(Options& options, SolveRequest& request) {
+  request.imu = options.text("imu");
+  request.at_imu_rate = options.text("rate") == "imu";
+  if (options.given("heading")) {
+    const std::vector<double> heading = options.numbers("heading", options.list("heading").size() == 2 ? 2 : 1);
+    if (!heading.empty()) request.heading_deg = heading[0];
+    if (heading.size() == 2) request.heading_sigma_deg = heading[1];
+    if (!(request.heading_sigma_deg > 0 && request.heading_sigma_deg <= 90))
+      options.fail("--heading: the sigma must lie in 0 .. 90 degrees");
+  }
+  if (request.imu.empty()) {
+    for (const char* name : {"heading", "rate"})
+      if (options.given(name) && options.text(name) != "gnss")
+        options.fail(std::string{"--"} + name + ' ' + options.text(name) + " needs --imu FILE");
+    return;
+  }
+  if (request.rig.empty()) options.fail("--imu needs --rig FILE: the axes and noise of the unit, and where the antenna is");
+  if (request.base.empty()) options.fail("--imu needs --base FILE: the tightly coupled estimator works with differences");
 }
 
 SolveRequest request_of(Options& options) {
@@ -83,6 +109,7 @@ SolveRequest request_of(Options& options) {
   request.formulation = options.text("robust"), request.sigma_profile = options.text("sigma-profile");
   request.mask_deg = options.optional_number("mask", 0, 89), request.min_cn0_dbhz = options.optional_number("min-cn0", 0, 60);
   take_signals(options, request);
+  take_imu(options, request);
   estimator::RtkOptions& o = request.options;
   const std::string ambiguity = options.text("ambiguity"), continuity = options.text("continuity");
   o.resolution.mode = ambiguity == "full"    ? ambiguity::ResolutionMode::full

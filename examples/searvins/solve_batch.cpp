@@ -6,6 +6,6 @@
 
 namespace searvins::examples {
 
-std::unique_ptr<SolverRun> make_batch_run(const estimator::RtkOptions& options) { return std::make_unique<RtkRun<robust::Batch>>(options); }
+std::unique_ptr<SolverRun> make_batch_run(const RunOptions& options) { return make_run_of<robust::Batch>(options); }
 
 }  // namespace searvins::examples

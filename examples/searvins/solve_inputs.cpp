@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <numbers>
 #include <string>
 #include <system_error>
@@ -10,6 +11,8 @@
 
 #include <searvins/geodesy/wgs84.hpp>
 #include <searvins/gnss/weighting.hpp>
+#include <searvins/io/imu_check.hpp>
+#include <searvins/io/imu_log.hpp>
 #include <searvins/io/rinex_navigation.hpp>
 #include <searvins/io/rinex_observation.hpp>
 #include <searvins/io/text_fields.hpp>
@@ -225,6 +228,77 @@ Failure take_truth(const SolveRequest& request, SolveInputs& in) {
   return {};
 }
 
+/// The inertial part of the settings from the rig.
+Failure take_unit(const SolveRequest& request, const Rig& rig, SolveInputs& in) {
+  if (!rig.imu)
+    return io::Diagnostic{request.rig, 0, "has no section \"imu\", which --imu needs: noise, axes and rate of the inertial unit",
+                          "add it (docs/inertial.md has an example), or leave --imu out"};
+  if (!rig.lever_arm_b_m)
+    return io::Diagnostic{request.rig, 0, "has no antenna.lever_arm_b_m, which --imu needs: from the inertial unit to the antenna, metres, body "
+                          "axes",
+                          "add \"antenna\": {\"lever_arm_b_m\": [x, y, z]}; [0, 0, 0] where they sit together"};
+  estimator::InertialOptions& inertial = in.inertial.emplace();
+  imu::ImuNoise& n = inertial.preintegration.noise;
+  n.accel_noise_mps2_sqrt_hz = rig.imu->accel_noise_mps2_sqrt_hz, n.gyro_noise_radps_sqrt_hz = rig.imu->gyro_noise_radps_sqrt_hz;
+  n.accel_bias_walk_mps3_sqrt_hz = rig.imu->accel_bias_walk_mps3_sqrt_hz;
+  n.gyro_bias_walk_radps2_sqrt_hz = rig.imu->gyro_bias_walk_radps2_sqrt_hz;
+  n.accel_bias_sigma_mps2 = rig.imu->accel_bias_sigma_mps2, n.gyro_bias_sigma_radps = rig.imu->gyro_bias_sigma_radps;
+  const bool is_mean = rig.imu->sample == RigImu::Sample::mean_to_stamp;
+  inertial.preintegration.kind = is_mean ? imu::SampleKind::mean_to_stamp : imu::SampleKind::instantaneous;
+  inertial.lever_arm_b_m = rig.R_rfu_b * *rig.lever_arm_b_m;
+  return {};
+}
+
+/// Whether a log with this fault cannot be used.
+bool is_fatal(io::ImuFault fault) {
+  using enum io::ImuFault;
+  return fault == columns_exchanged || fault == gravity_missing || fault == accel_magnitude || fault == gravity_axis;
+}
+
+void note_gaps(const std::string& name, const io::ImuLog& log, std::vector<std::string>& notes) {
+  if (log.gap_count == 0) return;
+  const auto longest = std::max_element(log.gaps.begin(), log.gaps.end(), [](const io::ImuGap& a, const io::ImuGap& b) {
+    return seconds_between(a.from, a.to) < seconds_between(b.from, b.to);
+  });
+  notes.push_back(name + ": " + std::to_string(log.gap_count) + (log.gap_count == 1 ? " gap" : " gaps") + " in the readings, longest " +
+                  io::fixed_text(seconds_between(longest->from, longest->to), 2) + " s from sow " + io::fixed_text(longest->from.sow(), 2) +
+                  "; gaps of more than " + io::fixed_text(imu::PreintegrationOptions{}.max_gap_s, 1) + " s are solved with GNSS alone");
+}
+
+/// The readings of the time to solve, in body axes; what is wrong with the log is an error or a note.
+Failure take_readings(const SolveRequest& request, const Rig& rig, SolveInputs& in) {
+  io::ImuLogOptions options;
+  options.reference = in.start;
+  io::Parsed<io::ImuLog> log = io::read_imu_log(request.imu, options);
+  if (log.error) return *log.error;
+  const std::string name = std::filesystem::path{request.imu}.filename().string();
+  std::vector<imu::ImuSample>& samples = log.value.samples;
+  note_skipped(request.imu, log.skipped, in.notes);
+  for (const io::ImuFinding& finding : log.value.findings) {
+    if (is_fatal(finding.fault)) return finding.text;
+    in.notes.push_back(name + ": " + finding.text.message + " (" + finding.text.hint + ")");
+  }
+  const GpsTime first = samples.front().time, last = samples.back().time;
+  if (first > in.end || last < in.start)
+    return io::Diagnostic{request.imu, 0,
+                          "does not overlap the rover in time: readings from " + time_text(first) + " to " + time_text(last) +
+                              ", rover from " + time_text(in.start) + " to " + time_text(in.end),
+                          "give the log of the rover's drive; its stamps must be GPS time"};
+  if (first > in.start.plus_seconds(1) || last.plus_seconds(1) < in.end)
+    in.notes.push_back(name + ": the readings cover only a part of the rover's time, from " + time_text(first) + " to " + time_text(last));
+  if (const auto rate = io::check_imu_rate(log.value.interval_s, rig.imu->rate_hz, name))
+    in.notes.push_back(name + ": " + rate->text.message + " (" + rate->text.hint + ")");
+  note_gaps(name, log.value, in.notes);
+  const Eigen::Matrix3d R_rfu_raw = rig.R_rfu_b * rig.imu->R_b_raw;
+  io::turn_axes(samples, R_rfu_raw);
+  if (const auto axis = io::check_gravity_axis(samples, R_rfu_raw, request.imu)) return axis->text;
+  in.imu_interval_s = log.value.interval_s;
+  const GpsTime from = in.start.plus_seconds(-1), to = in.end.plus_seconds(0.1);  // further, nothing asks for a solution
+  std::copy_if(samples.begin(), samples.end(), std::back_inserter(in.imu),
+               [&](const imu::ImuSample& s) { return s.time >= from && s.time <= to; });
+  return {};
+}
+
 }  // namespace
 
 void add_count(std::vector<Count>& counts, const std::string& what, long n) {
@@ -258,6 +332,9 @@ io::FileResult<SolveInputs> prepare(const SolveRequest& request) {
   if (const Failure f = take_sigmas(request, rig.gnss, in)) return *f;
   if (const Failure f = take_ephemerides(request, in)) return *f;
   if (const Failure f = take_truth(request, in)) return *f;
+  if (request.imu.empty()) return in;
+  if (const Failure f = take_unit(request, rig, in)) return *f;
+  if (const Failure f = take_readings(request, rig, in)) return *f;
   return in;
 }
 

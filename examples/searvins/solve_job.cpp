@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <deque>
 #include <map>
 #include <memory>
 #include <numbers>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include <searvins/geodesy/wgs84.hpp>
+#include <searvins/imu/attitude_angles.hpp>
 #include <searvins/io/rinex_observation.hpp>
 #include <searvins/io/text_fields.hpp>
 
@@ -47,7 +49,22 @@ io::TrajectoryRow row_of(const estimator::RtkSolution& s, double solve_ms) {
   row.n_sat = s.satellites, row.n_dd = s.double_differences;
   if (was_searched(s.verdict)) row.success_rate = s.success_rate;
   row.solve_ms = solve_ms;
+  if (s.has_attitude) {
+    const imu::AttitudeAngles a = imu::attitude_angles(s.R_nb);
+    row.roll_deg = a.roll_rad * kDeg, row.pitch_deg = a.pitch_rad * kDeg;
+    row.heading_deg = a.heading_rad * kDeg + (a.heading_rad < 0 ? 360 : 0);
+  }
   return row;
+}
+
+/// Velocity, attitude and biases, with sigmas. Those of roll and pitch are the sigmas of the turns about the forward and the right axis.
+void take_motion(const estimator::RtkSolution& s, ReportEpoch& epoch) {
+  epoch.sd_velocity_enu_mps = s.velocity_covariance_enu.diagonal().cwiseMax(0.0).cwiseSqrt();
+  if (!s.has_attitude) return;
+  const double heading = imu::heading_of(s.R_nb), east = std::sin(heading), north = std::cos(heading);
+  const Eigen::Vector3d sd_deg = s.attitude_sigma_rad * kDeg;
+  epoch.sd_attitude_deg = {std::hypot(east * sd_deg.x(), north * sd_deg.y()), std::hypot(north * sd_deg.x(), east * sd_deg.y()), sd_deg.z()};
+  epoch.accel_bias_mps2 = s.accel_bias_b_mps2, epoch.gyro_bias_dps = s.gyro_bias_b_radps * kDeg;
 }
 
 const char* name_of(gnss::CodeFate fate) {
@@ -71,12 +88,14 @@ class Collector {
     }
   }
 
-  void take(const gnss::ObservationEpoch& rover, const estimator::RtkSolution& s, const SolverRun& run, double solve_ms) {
+  /// `satellites_seen`: -1 for a solution without a rover epoch.
+  void take(const estimator::RtkSolution& s, int satellites_seen, const SolverRun& run, double solve_ms) {
     out_.rows.push_back(row_of(s, solve_ms));
     const gnss::DifferencedEpoch* differenced = run.differenced();
-    if (differenced && differenced->rover_tag != rover.tag) differenced = nullptr;
+    if (differenced && differenced->rover_tag != s.tag) differenced = nullptr;
     ReportEpoch& epoch = out_.epochs.emplace_back();
-    epoch.satellites_seen = static_cast<int>(rover.satellites.size()), epoch.satellites_used = s.satellites;
+    epoch.satellites_seen = satellites_seen, epoch.satellites_used = s.satellites;
+    take_motion(s, epoch);
     epoch.rejected.assign(out_.rejection_reasons.size(), 0);
     epoch.base_age_s = s.base_age_s;
     if (differenced)
@@ -88,7 +107,9 @@ class Collector {
     out_.restarts += s.restarted && out_.rows.size() > 1;
     if (!s.smoother_status.ok()) add_count(out_.incidents, std::string{"optimisation: "} + s.smoother_status.what);
     const bool differences_used = s.status != estimator::SolutionStatus::spp && s.status != estimator::SolutionStatus::dr;
-    if (differenced && !differenced->base_status.ok())
+    if (satellites_seen < 0)
+      add_count(out_.incidents, "no rover epoch: carried on by the inertial unit");
+    else if (differenced && !differenced->base_status.ok())
       add_count(out_.incidents, std::string{"no differences: "} + differenced->base_status.what);
     else if (with_base_ && !differences_used)
       add_count(out_.incidents, "no differences: too few satellites in common with the base");
@@ -188,6 +209,53 @@ class BaseFeed {
   bool more_{false};
 };
 
+/// Follows the alignment of the inertial unit.
+class AlignmentWatch {
+ public:
+  AlignmentWatch(GpsTime start, SolveOutcome& out) : since_(start), out_(out) {}
+  void take(const SolverRun& run, GpsTime time) {
+    const std::optional<AlignmentReport> now = run.alignment();
+    if (!now) return;
+    if (!now->aligned) add_count(out_.alignment_waits, now->waits_for);
+    if (now->aligned == aligned_ && now->alignments == alignments_) return;
+    aligned_ = now->aligned, alignments_ = now->alignments;
+    out_.alignment.push_back({time, aligned_, seconds_between(since_, time)});
+    since_ = time;
+  }
+
+ private:
+  GpsTime since_;
+  SolveOutcome& out_;
+  bool aligned_{false};
+  int alignments_{0};
+};
+
+/// Stretches without GNSS: two or more rows of dead reckoning, or a time without rows.
+std::vector<Outage> outages_of(const SolveInputs& in, const std::vector<io::TrajectoryRow>& rows) {
+  std::vector<Outage> outages;
+  const double step_s = in.rover.interval_s > 0 ? in.rover.interval_s : 1;
+  std::size_t last = 0;  // the last row with GNSS
+  const auto has_gnss = [&rows](std::size_t i) { return rows[i].status != io::SolutionStatus::dr; };
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    const bool at_end = i + 1 == rows.size();
+    if (!has_gnss(i) && !at_end) continue;
+    if (seconds_between(rows[last].time, rows[i].time) > 2.5 * step_s) {
+      Outage& outage = outages.emplace_back();
+      outage.from = rows[last].time, outage.to = rows[i].time;
+      const std::size_t worst = has_gnss(i) ? i - 1 : i;
+      if (worst > last && !has_gnss(worst)) {
+        const io::TrajectoryRow& row = rows[worst];
+        outage.sigma_m = std::hypot(row.sd_enu_m.x(), row.sd_enu_m.y());
+        ScoredEpoch scored;
+        if (in.truth) detail::score_row(row, *in.truth, {}, scored);
+        if (scored.has_error()) outage.horizontal_error_m = scored.horizontal_m();
+      }
+    }
+    last = i;
+  }
+  return outages;
+}
+
 /// Scores the run over the part of the recording that was solved.
 void score(const SolveRequest& request, const SolveInputs& in, SolveOutcome& out) {
   if (!in.truth || out.rows.empty()) return;
@@ -204,11 +272,138 @@ void score(const SolveRequest& request, const SolveInputs& in, SolveOutcome& out
     add_count(out.incidents, (request.truth.empty() ? "--truth-ecef" : request.truth) + ": " + evaluation.error().message);
 }
 
+/// Takes the solutions that are due, and knows which rover epochs are still without one.
+class Drain {
+ public:
+  Drain(const SolveInputs& in, SolverRun& run, SolveOutcome& out)
+      : in_(in), run_(run), out_(out), collector_(out, in.base.has_value()), watch_(in.start, out) {}
+
+  void add_rover(const gnss::ObservationEpoch& epoch) {
+    ++out_.rover_epochs;
+    const Status s = run_.add_rover(epoch);
+    if (s.ok())
+      waiting_.push_back({epoch.tag, static_cast<int>(epoch.satellites.size())});
+    else
+      add_count(out_.skipped, s.what);
+  }
+
+  void take_due() {
+    for (;;) {
+      const auto before = std::chrono::steady_clock::now();
+      const Result<estimator::RtkSolution> solution = run_.next();
+      const double solve_ms = milliseconds_since(before);
+      if (solution.ok()) {
+        take(*solution, solve_ms);
+      } else {
+        if (SolverRun::is_nothing_due(solution.status()) || waiting_.empty()) return;
+        add_count(out_.skipped, solution.status().what);
+        watch_.take(run_, waiting_.front().tag);
+        waiting_.pop_front();
+      }
+      collector_.take_lagged(run_.oldest());
+    }
+  }
+
+  void take_predicted() {
+    const Result<estimator::RtkSolution> predicted = run_.predict();
+    if (!predicted.ok() || !predicted->position_e_m.allFinite()) return;
+    out_.predicted_rows.push_back(row_of(*predicted, io::kUnknown));
+    out_.predicted_rows.back().success_rate = io::kUnknown;  // that of the solution it goes on from
+  }
+
+  void finish() {
+    collector_.take_lagged(std::nullopt);
+    collector_.finish();
+  }
+
+  [[nodiscard]] std::string progress_note() const {
+    return std::to_string(out_.rover_epochs) + " epochs, " + std::to_string(fixed_) + " fixed";
+  }
+
+ private:
+  struct Waiting {
+    GpsTime tag{};
+    int satellites{0};
+  };
+
+  void take(const estimator::RtkSolution& s, double solve_ms) {
+    int satellites_seen = -1;
+    while (!waiting_.empty() && waiting_.front().tag <= s.tag) {
+      if (waiting_.front().tag == s.tag) satellites_seen = waiting_.front().satellites;
+      waiting_.pop_front();
+    }
+    if (!s.position_e_m.allFinite() || (!out_.rows.empty() && s.time <= out_.rows.back().time)) {
+      add_count(out_.skipped, s.position_e_m.allFinite() ? "time of the state does not rise" : "position is not finite");
+      return;
+    }
+    collector_.take(s, satellites_seen, run_, solve_ms);
+    watch_.take(run_, s.time);
+    out_.answered_epochs += satellites_seen >= 0;
+    fixed_ += s.status == estimator::SolutionStatus::fix;
+    if (s.status != estimator::SolutionStatus::dr || s.has_attitude)
+      out_.solved_at_end = seconds_between(s.tag, in_.end) <= std::max(kEndS, 3 * in_.rover.interval_s);
+  }
+
+  const SolveInputs& in_;
+  SolverRun& run_;
+  SolveOutcome& out_;
+  Collector collector_;
+  AlignmentWatch watch_;
+  std::deque<Waiting> waiting_;
+  long fixed_{0};
+};
+
+/// Predicted rows that lie on a solution, or at its time within half a millisecond, give way to it.
+void drop_predictions_at_solutions(SolveOutcome& out) {
+  constexpr double kSameS = 5e-4;
+  const auto is_at_solution = [&out](const io::TrajectoryRow& p) {
+    const auto is_before = [](const io::TrajectoryRow& r, GpsTime t) { return r.time < t; };
+    const auto at = std::lower_bound(out.rows.begin(), out.rows.end(), p.time, is_before);
+    return (at != out.rows.end() && seconds_between(p.time, at->time) < kSameS) ||
+           (at != out.rows.begin() && seconds_between((at - 1)->time, p.time) < kSameS);
+  };
+  out.predicted_rows.erase(std::remove_if(out.predicted_rows.begin(), out.predicted_rows.end(), is_at_solution), out.predicted_rows.end());
+}
+
+/// Base, rover and readings in the order of time; solutions as they become due.
+void feed(const SolveRequest& request, const SolveInputs& in, io::RinexObservationReader& rover, BaseFeed& base, SolverRun& run,
+          SolveOutcome& out) {
+  Drain drain{in, run, out};
+  Progress progress{request.label, static_cast<std::size_t>(std::max(0.0, seconds_between(in.start, in.end) * 10)) + 1};
+  gnss::ObservationEpoch epoch;
+  const auto next_epoch = [&] {
+    bool more = rover.next(epoch);
+    while (more && epoch.tag < in.start) more = rover.next(epoch);
+    return more && epoch.tag <= in.end;
+  };
+  bool has_epoch = next_epoch();
+  std::size_t k = 0;
+  while (has_epoch || k < in.imu.size()) {
+    if (has_epoch && (k == in.imu.size() || epoch.tag <= in.imu[k].time)) {
+      base.feed(epoch.tag, run, out);
+      drain.add_rover(epoch);
+      drain.take_due();
+      progress.update(static_cast<std::size_t>(seconds_between(in.start, epoch.tag) * 10) + 1, drain.progress_note());
+      has_epoch = next_epoch();
+    } else {
+      if (const Status s = run.add_imu(in.imu[k++]); !s.ok()) add_count(out.incidents, std::string{"reading: "} + s.what);
+      drain.take_due();
+      if (request.at_imu_rate) drain.take_predicted();
+    }
+  }
+  run.finish();
+  drain.take_due();
+  drain.finish();
+  progress.finish();
+  drop_predictions_at_solutions(out);
+}
+
 }  // namespace
 
 io::FileResult<SolveOutcome> solve(const SolveRequest& request, const SolveInputs& in) {
   SolveOutcome out;
-  const std::unique_ptr<SolverRun> run = in.base ? make_run(request.formulation, in.options) : make_single_point_run(in.options);
+  const std::unique_ptr<SolverRun> run =
+      in.base ? make_run(request.formulation, {in.options, in.inertial}) : make_single_point_run(in.options);
   if (!run)
     return io::Diagnostic{"--robust", 0, "'" + request.formulation + "' is no formulation", "use batch, scalar, latent or symmetric"};
   for (const gnss::Ephemeris& e : in.ephemerides)
@@ -217,42 +412,20 @@ io::FileResult<SolveOutcome> solve(const SolveRequest& request, const SolveInput
   if (in.base)
     if (const Status s = run->set_base_position(in.base_position_e_m); !s.ok())
       return io::Diagnostic{request.base, 0, s.what, "give --base-ecef X,Y,Z"};
+  if (request.heading_deg)
+    if (const Status s = run->set_heading(imu::wrapped(*request.heading_deg / kDeg), request.heading_sigma_deg / kDeg);
+        !s.ok() && s.code != StatusCode::under_determined)  // kept until the unit is levelled
+      return io::Diagnostic{"--heading", 0, s.what, "give DEG or DEG,SIGMA"};
 
   io::RinexObservationReader rover;
   BaseFeed base;
   if (!rover.open(request.rover)) return *rover.error();
   if (const io::FileResult<bool> opened = base.open(request.base); !opened) return opened.error();
-  Collector collector{out, in.base.has_value()};
-  Progress progress{request.label, static_cast<std::size_t>(std::max(0.0, seconds_between(in.start, in.end) * 10)) + 1};
   const auto start = std::chrono::steady_clock::now();
-  gnss::ObservationEpoch epoch;
-  long fixed = 0;
-  while (rover.next(epoch) && epoch.tag <= in.end) {
-    if (epoch.tag < in.start) continue;
-    base.feed(epoch.tag, *run, out);
-    ++out.rover_epochs;
-    const auto before = std::chrono::steady_clock::now();
-    const Result<estimator::RtkSolution> solution = run->update(epoch);
-    const double solve_ms = milliseconds_since(before);
-    if (!solution.ok()) {
-      add_count(out.skipped, solution.status().what);
-    } else if (!solution->position_e_m.allFinite() || (!out.rows.empty() && solution->time <= out.rows.back().time)) {
-      add_count(out.skipped, solution->position_e_m.allFinite() ? "time of the state does not rise" : "position is not finite");
-    } else {
-      collector.take(epoch, *solution, *run, solve_ms);
-      fixed += solution->status == estimator::SolutionStatus::fix;
-      if (solution->status != estimator::SolutionStatus::dr)
-        out.solved_at_end = seconds_between(epoch.tag, in.end) <= std::max(kEndS, 3 * in.rover.interval_s);
-    }
-    collector.take_lagged(run->oldest());
-    progress.update(static_cast<std::size_t>(seconds_between(in.start, epoch.tag) * 10) + 1,
-                    std::to_string(out.rover_epochs) + " epochs, " + std::to_string(fixed) + " fixed");
-  }
-  collector.take_lagged(std::nullopt);
-  collector.finish();
-  progress.finish();
+  feed(request, in, rover, base, *run, out);
   out.wall_s = milliseconds_since(start) / 1000;
   score(request, in, out);
+  out.outages = outages_of(in, out.rows);
   return out;
 }
 

@@ -13,6 +13,7 @@
 
 #include <searvins/estimator/rtk_options.hpp>
 #include <searvins/gnss/ephemeris.hpp>
+#include <searvins/imu/imu_sample.hpp>
 #include <searvins/io/file_result.hpp>
 #include <searvins/io/rinex_info.hpp>
 #include <searvins/io/trajectory.hpp>
@@ -37,7 +38,11 @@ struct SolveRequest {
   std::optional<double> start_sow, end_sow;
   std::string formulation{kDefaultFormulation};
   std::string sigma_profile{kDefaultSigmaProfile};
-  std::vector<gnss::SignalCode> signals;  ///< empty: the rig's, else the best of every common carrier
+  std::string imu{};                       ///< log of an inertial unit; empty: GNSS only
+  std::optional<double> heading_deg{};     ///< at the beginning, from elsewhere
+  double heading_sigma_deg{5};
+  bool at_imu_rate{false};                 ///< rows between the solutions, one a reading
+  std::vector<gnss::SignalCode> signals{};  ///< empty: the rig's, else the best of every common carrier
   std::optional<double> mask_deg, min_cn0_dbhz;
   estimator::RtkOptions options{};  ///< what neither rig nor profile sets
   std::string command{};            ///< the command line, for the report
@@ -55,6 +60,9 @@ struct SolveInputs {
   std::string base_position_source{};
   std::optional<TruthTrack> truth;
   estimator::RtkOptions options{};
+  std::optional<estimator::InertialOptions> inertial{};
+  std::vector<imu::ImuSample> imu{};  ///< readings of the time to solve, in body axes
+  double imu_interval_s{0};
   std::vector<std::string> notes;  ///< what a user should know
 };
 
@@ -63,18 +71,30 @@ using Count = std::pair<std::string, long>;
 /// Adds `n` to the count of a text.
 void add_count(std::vector<Count>& counts, const std::string& what, long n = 1);
 
+/// Something that happened to the alignment of the inertial unit.
+struct AlignmentEvent {
+  GpsTime time{};
+  bool aligned{false};  ///< else: lost
+  double after_s{0};    ///< since the run's beginning, or since it was lost
+};
+
 /// What came out.
 struct SolveOutcome {
   std::vector<io::TrajectoryRow> rows, lagged_rows;
+  std::vector<io::TrajectoryRow> predicted_rows;  ///< between them, at the rate of the inertial unit
   std::vector<ReportEpoch> epochs;  ///< as many as rows
   std::vector<ReportSatellite> satellites;
   std::vector<std::string> rejection_reasons, fix_outcomes;
   std::vector<double> ratios, ages_s;  ///< as many as rows
   long rover_epochs{0};                ///< offered, between start and end
+  long answered_epochs{0};             ///< with a solution
+  std::vector<AlignmentEvent> alignment;
+  std::vector<Count> alignment_waits;  ///< rows that were not aligned, by what was waited for
+  std::vector<Outage> outages;
   std::vector<Count> skipped;          ///< rover epochs without a solution, by reason
   std::vector<Count> incidents;        ///< epochs with a solution that something happened to
   long restarts{0}, released_integers{0};
-  bool solved_at_end{false};  ///< there is a solution that rests on GNSS at the end of the recording
+  bool solved_at_end{false};  ///< there is a solution at the end of the recording that rests on GNSS or on an aligned inertial unit
   std::optional<Evaluation> evaluation;
   double wall_s{0};
 };

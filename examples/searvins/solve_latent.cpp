@@ -6,8 +6,6 @@
 
 namespace searvins::examples {
 
-std::unique_ptr<SolverRun> make_latent_run(const estimator::RtkOptions& options) {
-  return std::make_unique<RtkRun<robust::LatentPivot>>(options);
-}
+std::unique_ptr<SolverRun> make_latent_run(const RunOptions& options) { return make_run_of<robust::LatentPivot>(options); }
 
 }  // namespace searvins::examples

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <numbers>
 #include <string>
 #include <system_error>
@@ -104,13 +105,44 @@ std::string continuity_text(const SolveRequest& request) {
   return {};
 }
 
+/// The last row's diagnostics with biases; nullptr when there is none.
+const ReportEpoch* last_aligned(const SolveOutcome& outcome) {
+  const auto at = std::find_if(outcome.epochs.rbegin(), outcome.epochs.rend(), [](const ReportEpoch& e) { return e.accel_bias_mps2.allFinite(); });
+  return at == outcome.epochs.rend() ? nullptr : &*at;
+}
+
+std::string vector_text(const Eigen::Vector3d& v, int decimals) {
+  return io::fixed_text(v.x(), decimals) + ", " + io::fixed_text(v.y(), decimals) + ", " + io::fixed_text(v.z(), decimals);
+}
+
+/// Rows with an attitude.
+std::size_t aligned_rows(const SolveOutcome& outcome) {
+  return static_cast<std::size_t>(
+      std::count_if(outcome.rows.begin(), outcome.rows.end(), [](const io::TrajectoryRow& r) { return std::isfinite(r.heading_deg); }));
+}
+
+void append_inertial_figures(const SolveOutcome& outcome, std::vector<ReportEntry>& lines) {
+  for (const AlignmentEvent& e : outcome.alignment)
+    lines.emplace_back(e.aligned ? "aligned" : "alignment lost",
+                       "sow " + io::fixed_text(e.time.sow(), 1) + ", after " + io::fixed_text(e.after_s, 1) + " s");
+  lines.emplace_back("rows with attitude", percent(aligned_rows(outcome), static_cast<long>(outcome.rows.size())));
+  if (const ReportEpoch* e = last_aligned(outcome)) {
+    lines.emplace_back("accelerometer bias", vector_text(e->accel_bias_mps2, 4) + " m/s^2");
+    lines.emplace_back("gyroscope bias", vector_text(e->gyro_bias_dps, 4) + " deg/s");
+  }
+  if (outcome.outages.empty()) return;
+  const auto longest = std::max_element(outcome.outages.begin(), outcome.outages.end(),
+                                        [](const Outage& a, const Outage& b) { return a.length_s() < b.length_s(); });
+  lines.emplace_back("without GNSS", std::to_string(outcome.outages.size()) + " times, longest " + io::fixed_text(longest->length_s(), 1) + " s");
+}
+
 /// The lines of the summary; the report shows those that it does not compute itself.
 std::vector<ReportEntry> run_figures(const SolveInputs& in, const SolveOutcome& outcome) {
   std::vector<ReportEntry> lines;
   long skipped = 0;
   for (const Count& c : outcome.skipped) skipped += c.second;
   lines.emplace_back("rover epochs", std::to_string(outcome.rover_epochs));
-  lines.emplace_back("with a solution", percent(outcome.rows.size(), outcome.rover_epochs));
+  lines.emplace_back("with a solution", percent(static_cast<std::size_t>(outcome.answered_epochs), outcome.rover_epochs));
   if (skipped) lines.emplace_back("skipped", std::to_string(skipped));
   if (in.base) {
     lines.emplace_back("baseline", cell(baseline_km(in, outcome), 2) + " km");
@@ -118,6 +150,7 @@ std::vector<ReportEntry> run_figures(const SolveInputs& in, const SolveOutcome& 
     lines.emplace_back("window restarts", std::to_string(outcome.restarts));
     lines.emplace_back("integers taken back", std::to_string(outcome.released_integers));
   }
+  if (in.inertial) append_inertial_figures(outcome, lines);
   lines.emplace_back("update P50 / P95 / max", three(solve_times(outcome), 2, "ms"));
   lines.emplace_back("whole run", io::fixed_text(outcome.wall_s, 2) + " s");
   return lines;
@@ -145,6 +178,13 @@ std::vector<ReportEntry> settings(const SolveRequest& request, const SolveInputs
     s.emplace_back("elevation mask", io::fixed_text(in.options.differencing.screening.elevation_mask_rad * kDeg, 1) + " deg");
     s.emplace_back("least C/N0", io::fixed_text(in.options.differencing.screening.min_cn0_dbhz, 1) + " dB-Hz");
   }
+  if (in.inertial) {
+    s.emplace_back("inertial unit", name(request.imu));
+    s.emplace_back("readings", io::fixed_text(in.imu_interval_s > 0 ? 1 / in.imu_interval_s : 0, 1) + " Hz");
+    s.emplace_back("lever arm (right, forward, up)", vector_text(in.inertial->lever_arm_b_m, 3) + " m");
+    if (request.heading_deg)
+      s.emplace_back("heading given", io::fixed_text(*request.heading_deg, 1) + " +- " + io::fixed_text(request.heading_sigma_deg, 1) + " deg");
+  }
   std::string wanted;
   for (const gnss::SignalCode& c : in.options.differencing.selection.wanted)
     (wanted += wanted.empty() ? "" : " ") += {gnss::letter_of(c.constellation), c.band, c.attribute};
@@ -155,6 +195,11 @@ std::vector<ReportEntry> settings(const SolveRequest& request, const SolveInputs
 /// Notes on what was skipped or happened.
 std::vector<std::string> notes(const SolveInputs& in, const SolveOutcome& outcome) {
   std::vector<std::string> lines;
+  if (in.inertial && outcome.alignment.empty()) {
+    std::string waits;
+    for (const Count& c : outcome.alignment_waits) (waits += waits.empty() ? "" : "; ") += c.first + " (" + std::to_string(c.second) + " rows)";
+    lines.push_back("the inertial unit was never aligned, so GNSS was solved alone; it waited for " + (waits.empty() ? "readings" : waits));
+  }
   for (const Count& c : outcome.skipped) lines.push_back(std::to_string(c.second) + " rover epochs without a solution: " + c.first);
   for (const Count& c : outcome.incidents) lines.push_back(std::to_string(c.second) + " times " + c.first);
   lines.insert(lines.end(), in.notes.begin(), in.notes.end());
@@ -175,7 +220,7 @@ std::string subtitle_of(const SolveRequest& request, const SolveInputs& in, cons
   std::string text = std::string{date} + ", " + std::to_string(outcome.rover_epochs) + " rover epochs";
   if (in.rover.interval_s > 0) text += " at " + io::fixed_text(1 / in.rover.interval_s, in.rover.interval_s > 1 ? 3 : 0) + " Hz";
   if (in.base)
-    text += ", base " + cell(baseline_km(in, outcome), 2) + " km away, " + request.formulation + " formulation, " + mode_text(request) +
+    text += std::string{in.inertial ? ", with inertial unit" : ""} + ", base " + cell(baseline_km(in, outcome), 2) + " km away, " + request.formulation + " formulation, " + mode_text(request) +
             " ambiguity resolution";
   return text;
 }
@@ -188,6 +233,7 @@ RunReport report_of(const SolveRequest& request, const SolveInputs& in, const So
   if (in.base && request.options.resolution.mode != ambiguity::ResolutionMode::off)
     report.success_rate_gate = in.options.resolution.min_success_rate;
   report.satellites = outcome.satellites, report.truth = in.truth, report.evaluation = outcome.evaluation;
+  report.outages = outcome.outages;
   report.figures = run_figures(in, outcome), report.settings = settings(request, in), report.notes = notes(in, outcome);
   return report;
 }
@@ -208,6 +254,32 @@ void member_distribution(JsonWriter& json, const char* key, const std::vector<do
       .member("p95", percentile(v, 0.95))
       .member("max", percentile(v, 1))
       .end_object();
+}
+
+void member_vector(JsonWriter& json, const char* key, const Eigen::Vector3d& v) {
+  json.begin_array(key).value(v.x()).value(v.y()).value(v.z()).end_array();
+}
+
+void member_inertial(JsonWriter& json, const SolveOutcome& outcome) {
+  json.begin_object("inertial").member("rows_with_attitude", aligned_rows(outcome)).member("predicted_rows", outcome.predicted_rows.size());
+  json.begin_array("alignment");
+  for (const AlignmentEvent& e : outcome.alignment)
+    json.begin_object().member("sow", e.time.sow()).member("aligned", e.aligned).member("after_s", e.after_s).end_object();
+  json.end_array();
+  member_counts(json, "waited_for", outcome.alignment_waits);
+  if (const ReportEpoch* e = last_aligned(outcome)) {
+    member_vector(json, "accel_bias_mps2", e->accel_bias_mps2);
+    member_vector(json, "gyro_bias_dps", e->gyro_bias_dps);
+  }
+  json.begin_array("outages");
+  for (const Outage& o : outcome.outages)
+    json.begin_object()
+        .member("start_sow", o.from.sow())
+        .member("length_s", o.length_s())
+        .member("horizontal_error_m", o.horizontal_error_m)
+        .member("horizontal_sigma_m", o.sigma_m)
+        .end_object();
+  json.end_array().end_object();
 }
 
 std::string summary_json(const SolveRequest& request, const SolveInputs& in, const SolveOutcome& outcome) {
@@ -233,12 +305,13 @@ std::string summary_json(const SolveRequest& request, const SolveInputs& in, con
     json.member("fixed", e->fixed).member("correct_fixes", e->fixed - e->wrong_fixes).member("wrong_fixes", e->wrong_fixes);
     json.member("fix_rate_pct", e->fix_rate_pct);
     member_errors(json, "fixed_horizontal", e->fixed_horizontal);
-    json.member("mean_nees", e->mean_nees).end_object();
+    json.member("mean_nees", e->mean_nees).member("nees_within_95_pct", e->nees_within_95_pct).end_object();
   }
   member_counts(json, "skipped_epochs", outcome.skipped), member_counts(json, "incidents", outcome.incidents);
   member_counts(json, "rejected_signals", rejections(outcome)), member_counts(json, "integer_resolution", outcomes(outcome));
   member_distribution(json, "base_age_s", finite(outcome.ages_s)), member_distribution(json, "solve_ms", solve_times(outcome));
   json.member("restarts", outcome.restarts).member("released_integers", outcome.released_integers).member("wall_s", outcome.wall_s);
+  if (in.inertial) member_inertial(json, outcome);
   json.begin_array("notes");
   for (const std::string& note : in.notes) json.value(note);
   return json.end_array().end_object().text();
@@ -251,6 +324,15 @@ void append_counts(std::string& text, const char* title, const std::vector<Count
   text += '\n' + table.text();
 }
 
+/// Solutions and the rows between them, in the order of time.
+std::vector<io::TrajectoryRow> with_predictions(const SolveOutcome& outcome) {
+  std::vector<io::TrajectoryRow> rows;
+  rows.reserve(outcome.rows.size() + outcome.predicted_rows.size());
+  std::merge(outcome.rows.begin(), outcome.rows.end(), outcome.predicted_rows.begin(), outcome.predicted_rows.end(), std::back_inserter(rows),
+             [](const io::TrajectoryRow& a, const io::TrajectoryRow& b) { return a.time < b.time; });
+  return rows;
+}
+
 }  // namespace
 
 std::string summary_text(const SolveRequest& request, const SolveInputs& in, const SolveOutcome& outcome) {
@@ -261,7 +343,7 @@ std::string summary_text(const SolveRequest& request, const SolveInputs& in, con
   for (std::size_t s = 0; s < io::kSolutionStatuses; ++s) {
     const auto status = static_cast<io::SolutionStatus>(s);
     if (const std::size_t n = status_count(outcome, status))
-      table.row({io::name_of(status), std::to_string(n) + "  " + percent(n, outcome.rover_epochs)});
+      table.row({io::name_of(status), std::to_string(n) + "  " + percent(n, static_cast<long>(outcome.rows.size()))});
   }
   if (const auto& e = outcome.evaluation) {
     const auto errors = [](const ErrorFigures& f, int d) {
@@ -297,7 +379,7 @@ std::string write_outputs(const std::string& folder, const SolveRequest& request
   header.input_files.insert(header.input_files.end(), request.nav.begin(), request.nav.end());
   const Eigen::Vector3d origin_e_m = outcome.rows.empty() ? Eigen::Vector3d{6378137, 0, 0} : outcome.rows.front().p_e_m;
   const std::pair<const char*, std::string> files[] = {
-      {"trajectory.csv", io::trajectory_csv(outcome.rows)},
+      {"trajectory.csv", io::trajectory_csv(outcome.predicted_rows.empty() ? outcome.rows : with_predictions(outcome))},
       {"trajectory_lagged.csv", io::trajectory_csv(outcome.lagged_rows)},
       {"solution.pos", io::rtklib_solution(outcome.rows, header, outcome.ratios, outcome.ages_s)},
       {"trajectory.kml", io::trajectory_kml(outcome.rows)},

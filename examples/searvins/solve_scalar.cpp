@@ -6,8 +6,6 @@
 
 namespace searvins::examples {
 
-std::unique_ptr<SolverRun> make_scalar_run(const estimator::RtkOptions& options) {
-  return std::make_unique<RtkRun<robust::ScalarRows>>(options);
-}
+std::unique_ptr<SolverRun> make_scalar_run(const RunOptions& options) { return make_run_of<robust::ScalarRows>(options); }
 
 }  // namespace searvins::examples

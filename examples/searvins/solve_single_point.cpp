@@ -13,7 +13,7 @@
 namespace searvins::examples {
 namespace {
 
-class SinglePointRun final : public SolverRun {
+class SinglePointRun final : public EpochRun {
  public:
   explicit SinglePointRun(const estimator::RtkOptions& options) : tracker_(options.tracker) {}
 
@@ -24,6 +24,11 @@ class SinglePointRun final : public SolverRun {
   Status set_base_position(const Eigen::Vector3d&) override { return failure(StatusCode::unsupported, "a single-point run has no base"); }
   Status add_base(const gnss::ObservationEpoch&) override { return failure(StatusCode::unsupported, "a single-point run has no base"); }
 
+  [[nodiscard]] const gnss::DifferencedEpoch* differenced() const override { return nullptr; }
+  [[nodiscard]] const gnss::SinglePointSolution& single_point() const override { return single_point_; }
+  [[nodiscard]] std::optional<LaggedEstimate> oldest() const override { return std::nullopt; }
+
+ private:
   Result<estimator::RtkSolution> update(const gnss::ObservationEpoch& rover) override {
     single_point_ = {};
     const Result<gnss::TrackedPosition> tracked = tracker_.update(rover, ephemerides_);
@@ -43,11 +48,6 @@ class SinglePointRun final : public SolverRun {
     return out;
   }
 
-  [[nodiscard]] const gnss::DifferencedEpoch* differenced() const override { return nullptr; }
-  [[nodiscard]] const gnss::SinglePointSolution& single_point() const override { return single_point_; }
-  [[nodiscard]] std::optional<LaggedEstimate> oldest() const override { return std::nullopt; }
-
- private:
   gnss::SinglePointTracker tracker_;
   gnss::EphemerisStore<estimator::HostedCapacity::ephemerides> ephemerides_{};
   gnss::SinglePointSolution single_point_{};

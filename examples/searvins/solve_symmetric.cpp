@@ -6,8 +6,6 @@
 
 namespace searvins::examples {
 
-std::unique_ptr<SolverRun> make_symmetric_run(const estimator::RtkOptions& options) {
-  return std::make_unique<RtkRun<robust::LatentPivotSymmetric>>(options);
-}
+std::unique_ptr<SolverRun> make_symmetric_run(const RunOptions& options) { return make_run_of<robust::LatentPivotSymmetric>(options); }
 
 }  // namespace searvins::examples

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// \file
 /// What `searvins solve` needs of an estimator, whatever its robust formulation. The formulations are template arguments of the
-/// library, and one instantiation takes a compiler about a minute: each has a source file of its own (solve_*.cpp), and the
+/// library, and one instantiation takes a compiler minutes: each has a source file of its own (solve_*.cpp), and the
 /// command sees this interface alone.
 #pragma once
 
@@ -13,12 +13,14 @@
 
 #include <searvins/core/status.hpp>
 #include <searvins/core/time.hpp>
+#include <searvins/estimator/inertial_motion.hpp>
 #include <searvins/estimator/rtk_options.hpp>
 #include <searvins/estimator/rtk_solution.hpp>
 #include <searvins/gnss/differenced_epoch.hpp>
 #include <searvins/gnss/ephemeris.hpp>
 #include <searvins/gnss/observation.hpp>
 #include <searvins/gnss/single_point_solution.hpp>
+#include <searvins/imu/imu_sample.hpp>
 
 namespace searvins::examples {
 
@@ -32,7 +34,14 @@ struct LaggedEstimate {
   estimator::SolutionStatus status{estimator::SolutionStatus::dr};
 };
 
-/// One estimator at work. The calls are those of estimator::RtkEstimator.
+/// How a run with an inertial unit stands with its alignment.
+struct AlignmentReport {
+  bool aligned{false};
+  int alignments{0};          ///< so far
+  const char* waits_for{""};  ///< in words
+};
+
+/// One estimator at work. Inputs come in the order of time; solutions are taken with next() until none is due.
 class SolverRun {
  public:
   virtual ~SolverRun() = default;
@@ -44,25 +53,68 @@ class SolverRun {
   virtual void set_ionosphere(const gnss::KlobucharCoefficients& coefficients) = 0;
   virtual Status set_base_position(const Eigen::Vector3d& position_e_m) = 0;
   virtual Status add_base(const gnss::ObservationEpoch& epoch) = 0;
-  virtual Result<estimator::RtkSolution> update(const gnss::ObservationEpoch& rover) = 0;
+  virtual Status add_rover(const gnss::ObservationEpoch& epoch) = 0;
+  virtual Status add_imu(const imu::ImuSample&) { return failure(StatusCode::unsupported, "this run has no inertial unit"); }
+  virtual Status set_heading(double, double) { return failure(StatusCode::unsupported, "this run has no inertial unit"); }
+  /// No more input will come.
+  virtual void finish() {}
 
-  /// The differenced epoch of the last update; nullptr for an estimator that forms no differences.
+  /// Whether a status of next() says that nothing is due, rather than what is wrong with an epoch.
+  [[nodiscard]] static bool is_nothing_due(const Status& s) { return s.code == StatusCode::no_data && std::string_view{s.what} == kNothingDue; }
+  virtual Result<estimator::RtkSolution> next() = 0;
+  /// The antenna at the time of the newest reading, from the newest solution and the readings since.
+  [[nodiscard]] virtual Result<estimator::RtkSolution> predict() const {
+    return failure(StatusCode::unsupported, "this run has no inertial unit");
+  }
+
+  /// The differenced epoch of the last solution; nullptr for an estimator that forms no differences.
   [[nodiscard]] virtual const gnss::DifferencedEpoch* differenced() const = 0;
-  /// Single-point rows of the last update, empty when it had none.
+  /// Single-point rows of the last solution, empty when it had none.
   [[nodiscard]] virtual const gnss::SinglePointSolution& single_point() const = 0;
   /// The oldest state of the window, nothing while there is none.
   [[nodiscard]] virtual std::optional<LaggedEstimate> oldest() const = 0;
+  /// Nothing without an inertial unit.
+  [[nodiscard]] virtual std::optional<AlignmentReport> alignment() const { return std::nullopt; }
+
+ protected:
+  static constexpr const char* kNothingDue = "no solution is due";  ///< the words of estimator::Estimator
 };
 
-std::unique_ptr<SolverRun> make_batch_run(const estimator::RtkOptions& options);
-std::unique_ptr<SolverRun> make_scalar_run(const estimator::RtkOptions& options);
-std::unique_ptr<SolverRun> make_latent_run(const estimator::RtkOptions& options);
-std::unique_ptr<SolverRun> make_symmetric_run(const estimator::RtkOptions& options);
+/// A run whose estimator answers each rover epoch at once.
+class EpochRun : public SolverRun {
+ public:
+  Status add_rover(const gnss::ObservationEpoch& epoch) final {
+    epoch_ = epoch, has_epoch_ = true;
+    return ok_status();
+  }
+  Result<estimator::RtkSolution> next() final {
+    if (!has_epoch_) return failure(StatusCode::no_data, kNothingDue);
+    has_epoch_ = false;
+    return update(epoch_);
+  }
+
+ private:
+  virtual Result<estimator::RtkSolution> update(const gnss::ObservationEpoch& rover) = 0;
+
+  gnss::ObservationEpoch epoch_{};
+  bool has_epoch_{false};
+};
+
+/// Settings of a run: those of the inertial part are there when it has an inertial unit.
+struct RunOptions {
+  estimator::RtkOptions rtk{};
+  std::optional<estimator::InertialOptions> inertial;
+};
+
+std::unique_ptr<SolverRun> make_batch_run(const RunOptions& options);
+std::unique_ptr<SolverRun> make_scalar_run(const RunOptions& options);
+std::unique_ptr<SolverRun> make_latent_run(const RunOptions& options);
+std::unique_ptr<SolverRun> make_symmetric_run(const RunOptions& options);
 /// Without a base: robust single points and Doppler, filtered.
 std::unique_ptr<SolverRun> make_single_point_run(const estimator::RtkOptions& options);
 
 /// The estimator of a formulation by its word on the command line; empty for any other word.
-[[nodiscard]] inline std::unique_ptr<SolverRun> make_run(std::string_view formulation, const estimator::RtkOptions& options) {
+[[nodiscard]] inline std::unique_ptr<SolverRun> make_run(std::string_view formulation, const RunOptions& options) {
   if (formulation == "batch") return make_batch_run(options);
   if (formulation == "scalar") return make_scalar_run(options);
   if (formulation == "latent") return make_latent_run(options);

@@ -120,6 +120,23 @@ namespace detail {
   return text + "</section>\n";
 }
 
+/// The longest outages, in the order of time.
+[[nodiscard]] inline std::string outages_html(const RunReport& report) {
+  constexpr std::size_t kShown = 12;
+  std::vector<Outage> longest = report.outages;
+  std::stable_sort(longest.begin(), longest.end(), [](const Outage& a, const Outage& b) { return a.length_s() > b.length_s(); });
+  if (longest.size() > kShown) longest.resize(kShown);
+  std::sort(longest.begin(), longest.end(), [](const Outage& a, const Outage& b) { return a.from < b.from; });
+  std::vector<ReportEntry> lines;
+  for (const Outage& o : longest) {
+    std::string text = io::fixed_text(o.length_s(), 1) + " s";
+    if (std::isfinite(o.horizontal_error_m)) text += ", error " + cell(o.horizontal_error_m, 2) + " m";
+    if (std::isfinite(o.sigma_m)) text += ", sigma " + cell(o.sigma_m, 2) + " m";
+    lines.emplace_back("from sow " + io::fixed_text(o.from.sow(), 1), text);
+  }
+  return table_html(report.outages.size() > kShown ? "Without GNSS, the longest" : "Without GNSS", lines);
+}
+
 [[nodiscard]] inline std::string figures_html(const RunReport& report) {
   const auto counts = count_by_status(report.rows);
   constexpr const char* names[] = {"fixed", "float", "code differences", "single point", "dead reckoning"};
@@ -149,7 +166,7 @@ namespace detail {
       text += table_html("Covariance", {{"mean NEES, 3 expected", cell(e->mean_nees, 2)},
                                         {"within its 95 % region", cell(e->nees_within_95_pct, 1) + " %"}});
   }
-  return text + table_html(report.figures.empty() ? "" : "Run", report.figures);
+  return text + table_html(report.figures.empty() ? "" : "Run", report.figures) + outages_html(report);
 }
 
 [[nodiscard]] inline std::string settings_html(const RunReport& report) {

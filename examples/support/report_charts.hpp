@@ -146,6 +146,10 @@ class TimeChart extends Layers {
     g.beginPath();
     g.rect(x0, y0 - 2, x1 - x0, y1 - y0 + 4);
     g.clip();
+    for (const [from, to] of D.outages || []) {
+      g.fillStyle = C.outage;
+      g.fillRect(this.x(from), y0, Math.max(1, this.x(to) - this.x(from)), y1 - y0);
+    }
     this.o.paint(this);
     g.restore();
     this.overlay();
@@ -230,6 +234,24 @@ class TimeChart extends Layers {
       }
       g.fill();
     }
+  }
+  /* A dashed line at one value. */
+  mark(value, color) {
+    const g = this.g, y = Math.round(this.y(value)) + 0.5;
+    g.strokeStyle = color;
+    g.lineWidth = 1;
+    g.setLineDash([4, 3]);
+    g.beginPath();
+    g.moveTo(this.left, y);
+    g.lineTo(this.w - this.right, y);
+    g.stroke();
+    g.setLineDash([]);
+  }
+  /* The whole width between two values. */
+  stripe(low, high, color) {
+    const g = this.g, a = this.y(high), b = this.y(low);
+    g.fillStyle = color;
+    g.fillRect(this.left, a, this.w - this.left - this.right, b - a);
   }
   /* The area between two series. */
   band(low, high, color) {

@@ -45,10 +45,16 @@ class ReportData {
       column(std::array{"se", "sn", "su"}[static_cast<std::size_t>(k)], 4, [&](std::size_t i) { return rows[i].sd_enu_m[k]; });
     column("cen", 6, [&](std::size_t i) { return rows[i].cov_en_m2; });
     column("speed", 2, [&](std::size_t i) { return rows[i].v_enu_mps.norm(); });
+    for (int k = 0; k < 3; ++k)
+      column(std::array{"ve", "vn", "vu"}[static_cast<std::size_t>(k)], 3, [&](std::size_t i) { return rows[i].v_enu_mps[k]; });
+    column("roll", 3, [&](std::size_t i) { return rows[i].roll_deg; });
+    column("pitch", 3, [&](std::size_t i) { return rows[i].pitch_deg; });
+    column("hdg", 3, [&](std::size_t i) { return rows[i].heading_deg; });
     column("sr", 4, [&](std::size_t i) { return rows[i].success_rate; });
     column("ms", 3, [&](std::size_t i) { return rows[i].solve_ms; });
     add_errors();
     add_diagnostics();
+    add_outages(start);
     add_truth(w);
     add_scores();
     add_sky();
@@ -100,13 +106,15 @@ class ReportData {
   void add_errors() {
     if (!report_.truth) return;
     std::vector<Eigen::Vector3d> errors(report_.rows.size(), Eigen::Vector3d::Constant(io::kUnknown));
+    std::vector<double> nees(report_.rows.size(), io::kUnknown);
     for (const std::size_t i : kept_) {
       ScoredEpoch epoch;
       score_row(report_.rows[i], *report_.truth, {}, epoch);
-      errors[i] = epoch.error_enu_m;
+      errors[i] = epoch.error_enu_m, nees[i] = epoch.nees;
     }
     for (int k = 0; k < 3; ++k)
       column(std::array{"ee", "en", "eu"}[static_cast<std::size_t>(k)], 4, [&](std::size_t i) { return errors[i][k]; });
+    column("nees", 3, [&](std::size_t i) { return nees[i]; });
     column("h", 4, [&](std::size_t i) { return std::hypot(errors[i].x(), errors[i].y()); });
   }
 
@@ -123,6 +131,7 @@ class ReportData {
     column("outcome", 0, [&](std::size_t i) { return count(epochs[i].fix_outcome); });
     column("ratio", 2, [&](std::size_t i) { return epochs[i].ratio; });
     column("age", 2, [&](std::size_t i) { return epochs[i].base_age_s; });
+    add_motion_diagnostics();
     text_ += ",\"reasons\":" + names(report_.rejection_reasons) + ",\"outcomes\":" + names(report_.fix_outcomes);
     if (report_.success_rate_gate) text_ += ",\"gate\":" + json_literal(*report_.success_rate_gate);
     std::string lists;
@@ -133,6 +142,30 @@ class ReportData {
       lists += (lists.empty() ? "[" : ",[") + list + ']';
     }
     text_ += ",\"rejected\":[" + lists + ']';
+  }
+
+  /// Sigmas of velocity and attitude, biases.
+  void add_motion_diagnostics() {
+    const std::vector<ReportEpoch>& epochs = report_.epochs;
+    const auto vector = [&](std::array<const char*, 3> names, int decimals, Eigen::Vector3d ReportEpoch::*member) {
+      for (int k = 0; k < 3; ++k)
+        column(names[static_cast<std::size_t>(k)], decimals, [&](std::size_t i) { return (epochs[i].*member)[k]; });
+    };
+    vector({"sve", "svn", "svu"}, 4, &ReportEpoch::sd_velocity_enu_mps);
+    vector({"sroll", "spitch", "shdg"}, 4, &ReportEpoch::sd_attitude_deg);
+    vector({"bax", "bay", "baz"}, 5, &ReportEpoch::accel_bias_mps2);
+    vector({"bgx", "bgy", "bgz"}, 5, &ReportEpoch::gyro_bias_dps);
+  }
+
+  /// Stretches without GNSS, as pairs of times.
+  void add_outages(GpsTime start) {
+    std::string list;
+    for (const Outage& outage : report_.outages) {
+      append_number(list += list.empty() ? "[" : ",[", seconds_between(start, outage.from), 2);
+      append_number(list += ',', seconds_between(start, outage.to), 2);
+      list += ']';
+    }
+    if (!list.empty()) text_ += ",\"outages\":[" + list + ']';
   }
 
   [[nodiscard]] static std::string names(const std::vector<std::string>& words) {

@@ -25,13 +25,15 @@ function panel(title, note, entries, options) {
   return new TimeChart(box, options);
 }
 const worst = () => [4, 3, 2, 1, 0].map(s => C.status[s]);
+const outageLegend = () => D.outages ? [['without GNSS', C.outage]] : [];
 const used = () => STATUS.map((_, s) => s).filter(s => D.s.includes(s));
 const statusLegend = () => used().map(s => [STATUS_TEXT[s], C.status[s]]);
 const top = (a, p = 1) => quantile(sorted(a), p);
 
 /* Status along time. */
 panel(
-    'Solution', 'drag across any chart to zoom in time, double click to see it all', statusLegend,
+    'Solution', 'drag across any chart to zoom in time, double click to see it all',
+    () => statusLegend().concat(outageLegend()),
     {height: 30, ticks: [], axis: false, range: () => [0, 1], paint: c => c.ribbon(D.s, C.status)});
 
 /* Errors and sigmas. */
@@ -186,15 +188,85 @@ if (has(D.age) && top(D.age) > 0.5 * STEP)
     paint: c => c.line(D.age, C.cat[6]),
     rows: i => [['age', ok(D.age[i]) ? D.age[i].toFixed(1) + ' s' : '–']]
   });
-if (has(D.speed) && top(D.speed, 0.95) > 0.5)
-  panel('Speed', '', null, {
-    height: 80,
-    ticks: 3,
-    format: v => short(v) + ' m/s',
-    range: () => [0, top(D.speed, 0.999) * 1.15],
-    paint: c => c.line(D.speed, C.cat[4]),
-    rows: i => [['speed', ok(D.speed[i]) ? D.speed[i].toFixed(2) + ' m/s' : '–']]
+/* Consistency: are the errors as large as the sigmas say? */
+if (has(D.nees)) {
+  const over = (e, s) => e.map((v, i) => ok(v) && s && s[i] > 0 ? v / s[i] : null);
+  const ratios = [['east', over(D.ee, D.se), 0], ['north', over(D.en, D.sn), 1], ['up', over(D.eu, D.su), 3]];
+  const sizes = sorted([].concat(...ratios.map(r => r[1].map(v => ok(v) ? Math.abs(v) : null)))),
+        reach = Math.max(4, quantile(sizes, 1) * 1.1);
+  panel('Error over sigma', 'shaded: ±2, where 95 % belong', () => ratios.map(r => [r[0], C.cat[r[2]]]), {
+    height: 118,
+    scale: 'asinh',
+    knee: 2,
+    ticks: [-100, -10, -2, 0, 2, 10, 100],
+    range: () => [-reach, reach],
+    paint: c => {
+      c.stripe(-2, 2, C.band);
+      for (const r of ratios) c.dots(r[1], () => C.cat[r[2]], 1.4);
+    },
+    rows: i => ratios.map(r => [r[0], ok(r[1][i]) ? r[1][i].toFixed(2) : '–', C.cat[r[2]]])
   });
+  panel('NEES of the position', 'shaded: 0.22 to 9.35, where 95 % belong; line: 3, its expectation', null, {
+    height: 112,
+    scale: 'log',
+    range: () => [0.01, Math.max(20, top(D.nees) * 1.5)],
+    paint: c => {
+      c.stripe(0.2158, 9.3484, C.band);
+      c.mark(3, C.muted);
+      c.dots(D.nees.map(v => ok(v) ? Math.max(v, 0.0101) : null), i => C.status[D.s[i]], 1.6, worst());
+    },
+    rows: i => [['NEES', ok(D.nees[i]) ? D.nees[i].toFixed(2) : '–']]
+  });
+}
+
+/* Motion: velocity, attitude, biases. */
+const three = (title, note, names, series, colors, options) => {
+  const all = sorted([].concat(...series)), lo = quantile(all, options.log ? 0 : 0.0005), hi = quantile(all, options.log ? 1 : 0.9995),
+        room = Math.max((hi - lo) * 0.08, options.least || 0);
+  panel(title, note, () => names.map((n, k) => [n, C.cat[colors[k]], 1]), {
+    height: options.height || 100,
+    scale: options.log ? 'log' : 'linear',
+    format: v => short(v) + (options.unit.length > 4 ? '' : options.unit), /* the margin holds no more */
+    range: () => options.log ? [lo * 0.7, hi * 1.4] : [lo - room, hi + room],
+    paint: c => {
+      series.forEach((values, k) => {
+        const sigma = options.sigmas && options.sigmas[k];
+        if (has(sigma))
+          c.band(values.map((v, i) => ok(v) && ok(sigma[i]) ? v - 3 * sigma[i] : null),
+                 values.map((v, i) => ok(v) && ok(sigma[i]) ? v + 3 * sigma[i] : null), C.band);
+      });
+      series.forEach((values, k) => c.line(values, C.cat[colors[k]]));
+    },
+    rows: i => names.map((n, k) => {
+      const v = series[k][i], s = options.sigmas && options.sigmas[k] && options.sigmas[k][i];
+      return [n, ok(v) ? v.toFixed(options.digits) + options.unit + (ok(s) ? ' ± ' + s.toFixed(options.digits) : '') : '–', C.cat[colors[k]]];
+    })
+  });
+};
+if (has(D.speed) && top(D.speed, 0.95) > 0.5)
+  three('Velocity', 'of the antenna', ['east', 'north', 'up'], [D.ve, D.vn, D.vu], [0, 1, 3],
+        {unit: ' m/s', digits: 2, sigmas: [D.sve, D.svn, D.svu], height: 112});
+if (has(D.hdg)) {
+  panel('Heading', 'of the body, clockwise from north', null, {
+    height: 96,
+    ticks: [0, 90, 180, 270, 360],
+    format: v => v + '°',
+    range: () => [-8, 368],
+    paint: c => c.dots(D.hdg, () => C.accent, 1.4),
+    rows: i => [['heading', ok(D.hdg[i]) ? D.hdg[i].toFixed(2) + '°' + (D.shdg && ok(D.shdg[i]) ? ' ± ' + D.shdg[i].toFixed(2) : '') : '–']]
+  });
+  three('Roll and pitch', 'shaded: ±3 sigma', ['roll', 'pitch'], [D.roll, D.pitch], [0, 1],
+        {unit: '°', digits: 2, sigmas: [D.sroll, D.spitch], least: 0.2});
+  if (has(D.shdg))
+    three('Attitude, 3 sigma', 'as reported', ['roll', 'pitch', 'heading'],
+          [D.sroll, D.spitch, D.shdg].map(s => s.map(v => ok(v) ? 3 * v : null)), [0, 1, 6], {unit: '°', digits: 3, log: true});
+}
+if (has(D.bax))
+  three('Accelerometer bias', 'm/s², as estimated', ['right', 'forward', 'up'], [D.bax, D.bay, D.baz], [0, 1, 3],
+        {unit: ' m/s²', digits: 4, least: 0.002});
+if (has(D.bgx))
+  three('Gyroscope bias', 'as estimated', ['right', 'forward', 'up'], [D.bgx, D.bgy, D.bgz], [0, 1, 3],
+        {unit: ' °/s', digits: 4, least: 0.002});
 if (has(D.ms)) {
   const s = sorted(D.ms).filter(v => v > 0), hi = quantile(s, 1), lo = quantile(s, 0), wide = hi > 30 * lo;
   panel('Solve time', 'wall clock of one update', null, {

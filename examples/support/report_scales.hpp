@@ -15,7 +15,7 @@ let C = {};
 function readColors() {
   const style = getComputedStyle(document.documentElement), get = n => style.getPropertyValue('--' + n).trim();
   C = {status: STATUS.map(get), cat: [0, 1, 2, 3, 4, 5, 6, 7].map(i => get('c' + i))};
-  for (const n of ['ink', 'muted', 'grid', 'line', 'band', 'truth', 'accent', 'card', 'select']) C[n] = get(n);
+  for (const n of ['ink', 'muted', 'grid', 'line', 'band', 'truth', 'accent', 'card', 'select', 'outage']) C[n] = get(n);
 }
 readColors();
 const el = (tag, cls, html) => {

@@ -9,14 +9,14 @@ inline constexpr const char* kReportStyle = R"css(
 :root {
   color-scheme: light dark;
   --page: #f5f6f8; --card: #ffffff; --ink: #1b1f24; --muted: #66707c; --line: #dfe3e8; --grid: #eceff2; --accent: #2563c9;
-  --band: rgba(37, 99, 201, 0.13); --truth: #30363d; --select: rgba(37, 99, 201, 0.15); --shade: #f0f2f5;
+  --band: rgba(37, 99, 201, 0.13); --truth: #30363d; --select: rgba(37, 99, 201, 0.15); --shade: #f0f2f5; --outage: rgba(212, 51, 79, 0.11);
   --fix: #17914a; --float: #ee8a0e; --dgnss: #2f7de1; --spp: #d4334f; --dr: #8b929c;
   --c0: #3b76b8; --c1: #e8833a; --c2: #c94f5c; --c3: #4fa3a0; --c4: #6d9b3c; --c5: #c9a227; --c6: #9467bd; --c7: #8c6d5b;
 }
 @media (prefers-color-scheme: dark) {
   :root {
     --page: #111418; --card: #191d23; --ink: #e6e9ed; --muted: #98a2ae; --line: #2c333c; --grid: #232930; --accent: #6ea8fe;
-    --band: rgba(110, 168, 254, 0.17); --truth: #d5dae0; --select: rgba(110, 168, 254, 0.2); --shade: #20262d;
+    --band: rgba(110, 168, 254, 0.17); --truth: #d5dae0; --select: rgba(110, 168, 254, 0.2); --shade: #20262d; --outage: rgba(255, 102, 129, 0.16);
     --fix: #35c06d; --float: #ffa53d; --dgnss: #62a5ff; --spp: #ff6681; --dr: #8f98a3;
     --c0: #6ea6e0; --c1: #f5a062; --c2: #ec7f8a; --c3: #74c7c3; --c4: #9cc96a; --c5: #e3c15a; --c6: #b996db; --c7: #b99c8b;
   }
@@ -68,6 +68,10 @@ td:last-child { text-align: right; white-space: nowrap; padding-left: 12px; } tr
 th { color: var(--muted); }
 td.wrap { white-space: normal; overflow-wrap: anywhere; }
 caption { text-align: left; font-weight: 650; padding: 0 0 4px; } table + table { margin-top: 16px; }
+.runs td, .runs th { text-align: right; white-space: nowrap; padding-left: 14px; }
+.runs td:first-child, .runs th:first-child { text-align: left; padding-left: 0; }
+.runs i { display: inline-block; width: 10px; height: 10px; border-radius: 3px; margin-right: 7px; }
+.scroll { overflow-x: auto; }
 .share { display: flex; height: 12px; border-radius: 4px; overflow: hidden; margin: 4px 0 8px; background: var(--grid); }
 .share i { display: block; height: 100%; }
 .notes { margin: 0; padding-left: 18px; } .notes li { margin: 3px 0; }

@@ -3,11 +3,14 @@
 /// What report.html shows about a run, as plain data: a command fills a RunReport and hands it to write_report() (report.hpp).
 #pragma once
 
+#include <Eigen/Core>
+
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include <searvins/core/time.hpp>
 #include <searvins/io/trajectory.hpp>
 
 #include "examples/support/evaluation.hpp"
@@ -24,6 +27,19 @@ struct ReportEpoch {
   int fix_outcome{-1};                                           ///< index into RunReport::fix_outcomes
   double ratio{io::kUnknown};                                    ///< second best over best integer vector
   double base_age_s{io::kUnknown};
+  Eigen::Vector3d sd_velocity_enu_mps{Eigen::Vector3d::Constant(io::kUnknown)};
+  Eigen::Vector3d sd_attitude_deg{Eigen::Vector3d::Constant(io::kUnknown)};  ///< of roll, pitch and heading
+  Eigen::Vector3d accel_bias_mps2{Eigen::Vector3d::Constant(io::kUnknown)};  ///< right, forward, up
+  Eigen::Vector3d gyro_bias_dps{Eigen::Vector3d::Constant(io::kUnknown)};
+};
+
+/// A stretch of time without GNSS in the solution.
+struct Outage {
+  GpsTime from{}, to{};                  ///< the last solution with GNSS before it, the first after it (or the last row of the run)
+  double horizontal_error_m{io::kUnknown};  ///< of the last row without GNSS, where the truth knows
+  double sigma_m{io::kUnknown};          ///< horizontal, as reported there
+
+  [[nodiscard]] double length_s() const { return seconds_between(from, to); }
 };
 
 /// One satellite on the sky at one time.
@@ -55,6 +71,7 @@ struct RunReport {
   std::vector<ReportSatellite> satellites{};
   std::optional<TruthTrack> truth{};
   std::optional<Evaluation> evaluation{};  ///< scores for tiles, table and error distribution
+  std::vector<Outage> outages{};           ///< shaded in the charts over time
   std::vector<ReportEntry> figures{};      ///< further lines of the table of figures
   std::vector<ReportEntry> settings{};
   std::vector<std::string> notes{};  ///< what was skipped and why

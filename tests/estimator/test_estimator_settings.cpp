@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// P12 every settings field of the inertial estimator changes some output of a drive that has something for each of them; and none of its steps allocates.
+#include <atomic>
+#include <vector>
+
+#include "estimator/inertial_drive.hpp"
+
+namespace searvins::test {
+inline std::atomic<unsigned long long> allocation_count{
+    0};  // that of support/allocation_counter.hpp, which one file of an executable may include
+}
+
+using namespace searvins;
+using namespace searvins::test;
+using estimator::EstimatorOptions;
+
+namespace {
+
+EstimatorOptions few_signals(const InertialDrive& d) {
+  EstimatorOptions o = options_for(d);
+  for (const char* name : {"G1C", "E1C"}) {
+    gnss::SignalCode code;
+    REQUIRE(gnss::signal_from_text(name, 3, code));
+    (void)o.rtk.differencing.selection.wanted.push_back(code);
+  }
+  return o;
+}
+
+/// A light drive with lost readings (a short and a long gap), a silent rover, late rover epochs, and codes that disagree for half a minute.
+struct Eventful {
+  InertialDrive drive{simulated_inertial_drive("light", 95, 3)};
+  std::vector<Arrival> all{};
+
+  Eventful() {
+    Rng rng{5};
+    for (gnss::ObservationEpoch& epoch : drive.rover) {
+      const double t = drive.seconds(epoch.tag);
+      if (t < 60.5 || t > 85.5) continue;
+      for (auto& satellite : epoch.satellites)
+        for (auto& s : satellite.signals) s.code_m += uniform(rng, -60, 60);
+    }
+    all = arrivals(drive);
+    for (Arrival& a : all)
+      if (a.stream == Stream::rover && a.index % 4 == 0) a.at = a.at.plus_seconds(0.1);
+    std::stable_sort(all.begin(), all.end(), [](const Arrival& a, const Arrival& b) { return a.at < b.at; });
+    cut(all, drive, Stream::imu, 12.2, 12.5);
+    cut(all, drive, Stream::imu, 33.2, 33.5);
+    cut(all, drive, Stream::rover, 40.5, 45.5);
+  }
+  [[nodiscard]] std::vector<double> outputs(const EstimatorOptions& options) const { return numbers_of(run_all(drive, all, options)); }
+};
+
+struct Flip {
+  const char* name;
+  void (*change)(EstimatorOptions&);
+};
+
+const Flip kFlips[] = {
+    {"rtk.lag_s", [](EstimatorOptions& o) { o.rtk.lag_s = 3; }},
+    {"latency_s", [](EstimatorOptions& o) { o.latency_s = 0.05; }},
+    {"silence_s", [](EstimatorOptions& o) { o.silence_s = 0.5; }},
+    {"restarts_to_realign", [](EstimatorOptions& o) { o.restarts_to_realign = 0; }},
+    {"initializer.min_rest_s", [](EstimatorOptions& o) { o.initializer.min_rest_s = 15; }},
+    {"initializer.min_speed_mps", [](EstimatorOptions& o) { o.initializer.min_speed_mps = 6; }},
+    {"initializer.max_heading_sigma_rad", [](EstimatorOptions& o) { o.initializer.max_heading_sigma_rad = 0.02; }},
+    {"inertial.lever_arm_b_m", [](EstimatorOptions& o) { o.inertial.lever_arm_b_m.x() += 0.1; }},
+    {"inertial.detector.accel_idle_mps2",
+     [](EstimatorOptions& o) {
+       o.inertial.detector.accel_idle_mps2 = o.inertial.detector.gyro_idle_radps = 0, o.inertial.detector.noise_factor = 0.1;
+     }},
+    {"inertial.zero_velocity", [](EstimatorOptions& o) { o.inertial.zero_velocity = false; }},
+    {"inertial.zero_angular_rate", [](EstimatorOptions& o) { o.inertial.zero_angular_rate = false; }},
+    {"inertial.zero_velocity_sigma_mps", [](EstimatorOptions& o) { o.inertial.zero_velocity_sigma_mps = 0.3; }},
+    {"inertial.zero_rate_sigma_radps", [](EstimatorOptions& o) { o.inertial.zero_rate_sigma_radps = 0.1; }},
+    {"inertial.non_holonomic", [](EstimatorOptions& o) { o.inertial.non_holonomic = true; }},
+    {"inertial.max_fix_jump_statistic", [](EstimatorOptions& o) { o.inertial.max_fix_jump_statistic = 1e-4; }},
+    {"inertial.preintegration.kind", [](EstimatorOptions& o) { o.inertial.preintegration.kind = imu::SampleKind::mean_to_stamp; }},
+    {"inertial.preintegration.max_gap_s", [](EstimatorOptions& o) { o.inertial.preintegration.max_gap_s = 0.25; }},
+    {"inertial.preintegration.bridged_after_s", [](EstimatorOptions& o) { o.inertial.preintegration.bridged_after_s = 0.4; }},
+    {"inertial.preintegration.bridge_accel_sigma_mps2",
+     [](EstimatorOptions& o) { o.inertial.preintegration.bridge_accel_sigma_mps2 = 10; }},
+    {"inertial.preintegration.bridge_gyro_sigma_radps", [](EstimatorOptions& o) { o.inertial.preintegration.bridge_gyro_sigma_radps = 1; }},
+    {"inertial.preintegration.noise.accel_noise",
+     [](EstimatorOptions& o) { o.inertial.preintegration.noise.accel_noise_mps2_sqrt_hz *= 2; }},
+    {"inertial.preintegration.noise.gyro_noise",
+     [](EstimatorOptions& o) { o.inertial.preintegration.noise.gyro_noise_radps_sqrt_hz *= 2; }},
+    {"inertial.preintegration.noise.accel_bias_walk",
+     [](EstimatorOptions& o) { o.inertial.preintegration.noise.accel_bias_walk_mps3_sqrt_hz *= 5; }},
+    {"inertial.preintegration.noise.gyro_bias_walk",
+     [](EstimatorOptions& o) { o.inertial.preintegration.noise.gyro_bias_walk_radps2_sqrt_hz *= 5; }},
+    {"inertial.preintegration.noise.accel_bias_sigma",
+     [](EstimatorOptions& o) { o.inertial.preintegration.noise.accel_bias_sigma_mps2 *= 3; }},
+};
+
+/// Flips that count only together with another setting.
+const Flip kWheels[] = {
+    {"inertial.axle_b_m",
+     [](EstimatorOptions& o) {
+       o.inertial.axle_b_m = {0, 1, 0};
+     }},
+    {"inertial.non_holonomic_sigma_mps", [](EstimatorOptions& o) { o.inertial.non_holonomic_sigma_mps = 0.01; }},
+    {"inertial.non_holonomic_from_mps", [](EstimatorOptions& o) { o.inertial.non_holonomic_from_mps = 9; }},
+};
+const Flip kRestSpeeds[] = {
+    {"inertial.max_rest_speed_sigmas", [](EstimatorOptions& o) { o.inertial.max_rest_speed_sigmas = 0; }},
+    {"inertial.max_rest_speed_mps", [](EstimatorOptions& o) { o.inertial.max_rest_speed_mps = 0.3; }},
+};
+const Flip kRestarts[] = {{"realign_within_s", [](EstimatorOptions& o) { o.realign_within_s = 0.5; }}};
+const Flip kMovingStart[] = {{"inertial.preintegration.noise.gyro_bias_sigma",
+                              [](EstimatorOptions& o) { o.inertial.preintegration.noise.gyro_bias_sigma_radps *= 3; }}};
+const Flip kJumps[] = {{"inertial.fix_jump_floor_m", [](EstimatorOptions& o) { o.inertial.fix_jump_floor_m = 10; }}};
+
+template <std::size_t N>
+void check_flips(const Eventful& e, const EstimatorOptions& reference, const Flip (&flips)[N]) {
+  const std::vector<double> before = e.outputs(reference);
+  for (const Flip& flip : flips) {
+    EstimatorOptions options = reference;
+    flip.change(options);
+    const std::string name = flip.name;
+    CAPTURE(name);
+    const bool changed = e.outputs(options) != before;
+    CHECK(changed);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("P12 every settings field of the inertial estimator changes some output") {
+  const Eventful e;
+  EstimatorOptions options = few_signals(e.drive);
+  check_flips(e, options, kFlips);
+  EstimatorOptions wheels = options, rests = options, jumps = options, impatient = options;
+  wheels.inertial.non_holonomic = true;
+  check_flips(e, wheels, kWheels);
+  rests.inertial.max_rest_speed_mps = 0;
+  check_flips(e, rests, kRestSpeeds);
+  impatient.rtk.min_suspect_epochs = 1;  // windows are given up often
+  check_flips(e, impatient, kRestarts);
+  Eventful moving;  // no rest that measures the gyroscope's bias
+  cut(moving.all, moving.drive, Stream::imu, -10, 25);
+  check_flips(moving, options, kMovingStart);
+  jumps.inertial.max_fix_jump_statistic = 1e-4;
+  check_flips(e, jumps, kJumps);
+}
+
+TEST_CASE("a minute of readings and epochs, GNSS alone, aligned, bridged and aligned anew, without one heap allocation") {
+  const InertialDrive d = simulated_inertial_drive("light", 60, 2);
+  std::vector<Arrival> all = arrivals(d);
+  cut(all, d, Stream::rover, 40.5, 45.5);
+  cut(all, d, Stream::imu, 50, 52);
+  InertialUnderTest e = estimator_for(d, few_signals(d));
+  const auto alive = allocation_count.load();
+  CHECK(std::vector<double>(100, 1.0).size() == 100);
+  CHECK(allocation_count.load() > alive);  // the counter counts
+  const auto before = allocation_count.load();
+  int solutions = 0, aligned = 0;
+  for (const Arrival& a : all) {
+    (void)hand_over(e, d, a);
+    for (auto s = e.next(); s.ok(); s = e.next()) ++solutions, aligned += s->has_attitude ? 1 : 0;
+    (void)e.predict(a.at);
+  }
+  const auto allocations = allocation_count.load() - before;
+  CHECK(allocations == 0);
+  CHECK(solutions >= 59);
+  CHECK(aligned > 20);
+}
