@@ -33,6 +33,7 @@
 #include <searvins/imu/imu_sample.hpp>
 #include <searvins/imu/initializer.hpp>
 #include <searvins/imu/position_fix.hpp>
+#include <searvins/imu/preintegration.hpp>
 #include <searvins/stationary/detector.hpp>
 
 namespace searvins::estimator {
@@ -79,8 +80,10 @@ class Estimator {
     if (!sample.finite()) return failure(StatusCode::non_finite, "IMU sample with a NaN or infinite reading");
     if (has_imu_ && sample.time == newest_imu_) return failure(StatusCode::duplicate, "IMU sample with the time of the one before");
     if (has_imu_ && sample.time < newest_imu_) return failure(StatusCode::out_of_order, "IMU sample earlier than the one before");
+    if (samples_.full() && !aligned_ && epochs_.empty() && positions_.empty()) samples_.pop();  // nothing to align with yet: the oldest say least
     if (!samples_.push(sample)) return failure(StatusCode::capacity_exceeded, "IMU samples wait for next(): take solutions more often");
     has_imu_ = true, newest_imu_ = sample.time;
+    if (aligned_) (void)ahead_.push(sample);  // what it refuses is refused again, and acted on, where the state is made
     see(sample.time);
     return ok_status();
   }
@@ -93,7 +96,7 @@ class Estimator {
   Status add_rover(const gnss::ObservationEpoch& epoch) {
     if (has_rover_ && epoch.tag <= newest_rover_)
       return failure(epoch.tag == newest_rover_ ? StatusCode::duplicate : StatusCode::out_of_order, "rover epoch not after the last one");
-    if (has_answered_ && epoch.tag <= answered_) return failure(StatusCode::out_of_order, "rover epoch later than the declared latency");
+    if (is_answered(epoch.tag)) return failure(StatusCode::out_of_order, "rover epoch later than the declared latency");
     if (!epochs_.push(epoch)) return failure(StatusCode::capacity_exceeded, "rover epochs wait for next(): take solutions more often");
     has_rover_ = true, newest_rover_ = epoch.tag;
     see(epoch.tag);
@@ -103,7 +106,7 @@ class Estimator {
   Status add_position(const imu::PositionFix& fix) {
     if (!fix.position_e_m.allFinite() || !fix.covariance_e_m2.allFinite()) return failure(StatusCode::non_finite, "position or its covariance is not finite");
     if (has_rover_ && fix.time <= newest_rover_) return failure(fix.time == newest_rover_ ? StatusCode::duplicate : StatusCode::out_of_order, "position not after the last one");
-    if (has_answered_ && fix.time <= answered_) return failure(StatusCode::out_of_order, "position later than the declared latency");
+    if (is_answered(fix.time)) return failure(StatusCode::out_of_order, "position later than the declared latency");
     if (!positions_.push(fix)) return failure(StatusCode::capacity_exceeded, "positions wait for next(): take solutions more often");
     has_rover_ = true, newest_rover_ = fix.time;
     see(fix.time);
@@ -132,12 +135,15 @@ class Estimator {
   /// The antenna at a time after the newest state, from readings alone: output at the unit's rate. Errors: no_data (not aligned, not covered).
   [[nodiscard]] Result<RtkSolution> predict(GpsTime time) const {
     if (!aligned_) return failure(StatusCode::no_data, "not aligned yet");
-    return bound_.predict_at(time);
+    const auto motion = ahead_.until(time);
+    if (!motion.ok()) return motion.status();
+    return bound_.predict_by(*motion);
   }
 
   [[nodiscard]] bool is_aligned() const { return aligned_; }
   /// What the alignment is at, and in words what it waits for.
   [[nodiscard]] imu::AlignmentState alignment_state() const { return aligned_ ? imu::AlignmentState::aligned : initializer_.state(); }
+  [[nodiscard]] imu::HeadingSource heading_source() const { return initializer_.heading_source(); }
   [[nodiscard]] const char* waiting_text() const { return aligned_ ? imu::text_of(imu::AlignmentWait::nothing) : initializer_.waiting_text(); }
   [[nodiscard]] int alignments() const { return alignments_; }
   /// The estimator that gave the last solution, for reports.
@@ -150,9 +156,10 @@ class Estimator {
   static constexpr double kNoVelocityMps = 1e3;  ///< sigma of a velocity that there is none of
   static constexpr double kClockMarginS = 0.03;  ///< a state's time lies this much around its epoch's tag
 
-  /// With an inertial unit two satellites are worth differencing, and a window does not end with a gap.
+  /// With an inertial unit two satellites are worth differencing, and what codes have said is remembered over a longer way.
   [[nodiscard]] static RtkOptions inertial_rtk(RtkOptions options) {
     options.min_satellites = std::min(options.min_satellites, 2);
+    options.code_correlation_m *= 3;
     return options;
   }
   [[nodiscard]] static imu::InitializerSettings initializer_settings(const Options& options) {
@@ -178,9 +185,24 @@ class Estimator {
   }
 
   Result<RtkSolution> answer(Result<RtkSolution> solution) {
+    if (aligned_) look_ahead();
     if (!solution.ok()) return solution;
     has_answered_ = true, answered_ = solution->tag;
+    answered_by_readings_ = solution->status == SolutionStatus::dr;
     return solution;
+  }
+  /// Whether the time of a rover epoch has been answered for. A state from readings alone knows its receiver tag to the clock's drift only.
+  [[nodiscard]] bool is_answered(GpsTime tag) const {
+    return has_answered_ && tag <= (answered_by_readings_ ? answered_.plus_seconds(kClockMarginS) : answered_);
+  }
+
+  /// Integrates ahead of the newest state, for predict().
+  void look_ahead() {
+    const auto bias = imu::bias_of(bound_.state());
+    if (ahead_.restart(bound_.state_time(), bias).ok()) return;
+    (void)ahead_.start(bound_.state_time(), bias, options_.inertial.preintegration);
+    (void)ahead_.push(last_sample_);
+    for (std::size_t k = 0; k < samples_.size(); ++k) (void)ahead_.push(samples_[k]);
   }
 
   [[nodiscard]] Result<RtkSolution> solve(const gnss::ObservationEpoch& epoch) {
@@ -302,13 +324,14 @@ class Estimator {
   imu::Initializer initializer_;
   stationary::Detector detector_;
   geodesy::LocalFrame frame_{};
+  imu::Preintegration<double, 4096> ahead_{};  ///< from the newest state to the newest reading
   RingBuffer<imu::ImuSample, 8192> samples_{};
   RingBuffer<gnss::ObservationEpoch, 16> epochs_{};
   RingBuffer<imu::PositionFix, 64> positions_{};
   gnss::ObservationEpoch epoch_{};
   imu::ImuSample last_sample_{};
   GpsTime newest_imu_{}, newest_rover_{}, newest_input_{}, answered_{}, last_restart_{};
-  bool has_imu_{false}, has_rover_{false}, has_input_{false}, has_answered_{false}, has_frame_{false}, aligned_{false}, finished_{false};
+  bool has_imu_{false}, has_rover_{false}, has_input_{false}, has_answered_{false}, has_frame_{false}, answered_by_readings_{false}, aligned_{false}, finished_{false};
   int alignments_{0}, restarts_{0};
 };
 

@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include <searvins/core/static_vector.hpp>
 #include <searvins/core/status.hpp>
@@ -95,6 +96,10 @@ class InertialMotion {
     const auto motion = integration_.until(to);
     if (!motion.ok()) return motion.status();
     return imu::predict(x, *motion, earth_);
+  }
+  /// State and covariance at the end of a motion from elsewhere.
+  [[nodiscard]] std::pair<State, Covariance> predict_by(const State& x, const Covariance& P, const imu::PreintegratedMotion<double>& motion) const {
+    return {imu::predict(x, motion, earth_), imu::predict_covariance(x, P, motion, options_.preintegration.noise, earth_)};
   }
   /// That of `x` itself where readings do not reach.
   [[nodiscard]] Covariance predicted_covariance(const State& x, const Covariance& P, GpsTime, GpsTime to) const {
@@ -218,7 +223,7 @@ class InertialMotion {
   Earth earth_{};
   imu::Preintegration<double, SampleCapacity> integration_{};
   stationary::Detector detector_;
-  StaticVector<imu::ImuSample, 16> recent_{};
+  StaticVector<imu::ImuSample, 32> recent_{};
   double sigma_velocity_mps_{1};
 };
 

@@ -118,14 +118,14 @@ class RtkEstimator {
     motion_.set_frame(frame);
     settle(state, covariance, time);
   }
-  /// The antenna at a time after the newest state by the motion alone; nothing is changed. Errors: no_data, and those of the motion.
-  [[nodiscard]] Result<RtkSolution> predict_at(GpsTime time) const {
+  /// The antenna at the end of a motion that begins at the newest state; nothing is changed. Errors: no_data.
+  template <class Integrated>
+  [[nodiscard]] Result<RtkSolution> predict_by(const Integrated& motion) const {
     if (!has_state_) return failure(StatusCode::no_data, "there is no state yet");
-    const auto x = motion_.predict(last_state_, last_time_, time);
-    if (!x.ok()) return x.status();
     RtkSolution out;
-    out.tag = out.time = time;
-    describe(*x, motion_.predicted_covariance(last_state_, last_covariance_, last_time_, time), motion_.antenna_at(time), out);
+    out.tag = out.time = motion.end;
+    const auto [x, P] = motion_.predict_by(last_state_, last_covariance_, motion);
+    describe(x, P, motion_.antenna_at(motion.end), out);
     return out;
   }
   [[nodiscard]] Motion& motion() { return motion_; }
@@ -189,7 +189,7 @@ class RtkEstimator {
     if (time <= last_time_) return failure(StatusCode::out_of_order, "a state not after the last one");
     if (const auto x = motion_.predict(last_state_, last_time_, time); !x.ok()) return x.status();
     RtkSolution out;
-    out.tag = out.time = time;
+    out.time = time, out.tag = time.plus_seconds(clock_offset_s_);
     out.clock_offset_s = clock_offset_s_;
     single_point_ = {};
     predict(failure(StatusCode::no_data, "no rover epoch"), out);
