@@ -162,9 +162,8 @@ class CityReceiver {
 
   /// What arrives and what stays locked at an instant, dt after the one before.
   void follow(double t_s, double dt_s) {
-    static const City kNothing{};
     const Eigen::Vector3d p = plan_.antenna_w_m(t_s), v = (plan_.antenna_w_m(t_s + 0.02) - plan_.antenna_w_m(t_s - 0.02)) / 0.04;
-    const City& city = plan_.city ? *plan_.city : kNothing;
+    const City& city = plan_.city ? *plan_.city : nothing_;
     const Surroundings around(city, p);
     const District district = plan_.district(t_s);
     for (std::size_t s = 0; s < orbits_.size(); ++s) {
@@ -343,6 +342,7 @@ class CityReceiver {
   }
 
   CityReceiverPlan plan_;
+  City nothing_{};  ///< where the plan has no city
   const std::vector<Orbit>& orbits_;
   Random random_;
   std::vector<Channel> channels_;
