@@ -18,6 +18,7 @@
 #include <searvins/geodesy/wgs84.hpp>
 
 #include "estimator/inertial_under_test.hpp"
+#include "estimator/solution_numbers.hpp"
 #include "support/property.hpp"
 
 namespace searvins::test {
@@ -208,36 +209,6 @@ inline DriveScore score_of(const InertialDrive& d, const Run& run, double from_s
   return score;
 }
 
-/// Every number of a solution, to be compared bit by bit.
-inline std::vector<double> numbers_of(const estimator::RtkSolution& s) {
-  std::vector<double> v{static_cast<double>(s.tag.ns % 1'000'000'000'000'000),
-                        static_cast<double>(s.time.ns % 1'000'000'000'000'000),
-                        static_cast<double>(s.status),
-                        s.clock_offset_s,
-                        static_cast<double>(s.satellites),
-                        static_cast<double>(s.double_differences),
-                        static_cast<double>(s.phases),
-                        static_cast<double>(s.fixed_phases),
-                        std::isnan(s.base_age_s) ? -1 : s.base_age_s,
-                        static_cast<double>(s.verdict),
-                        s.success_rate,
-                        s.ratio,
-                        s.code_weight,
-                        s.phase_weight,
-                        s.code_scale,
-                        s.phase_scale,
-                        static_cast<double>(s.held_integers),
-                        static_cast<double>(s.released_integers),
-                        static_cast<double>(s.iterations),
-                        static_cast<double>(s.restarted),
-                        static_cast<double>(s.has_attitude),
-                        static_cast<double>(s.stationary)};
-  for (int i = 0; i < 3; ++i) {
-    v.insert(v.end(), {s.position_e_m[i], s.velocity_e_mps[i], s.attitude_sigma_rad[i], s.accel_bias_b_mps2[i], s.gyro_bias_b_radps[i]});
-    for (int j = 0; j < 3; ++j) v.insert(v.end(), {s.covariance_enu_m2(i, j), s.velocity_covariance_enu(i, j), s.R_nb(i, j)});
-  }
-  return v;
-}
 inline std::vector<double> numbers_of(const Run& run) {
   std::vector<double> all;
   for (const estimator::RtkSolution& s : run.solutions) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The RTK estimator on simulated drives: accuracy, wrong integers let go, slips, lost base, few satellites, gaps, bad epochs, capacity, repeatability.
 #include "estimator/simulated_drive.hpp"
+#include "estimator/solution_numbers.hpp"
 
 using namespace searvins;
 using namespace searvins::test;
@@ -9,33 +10,6 @@ using estimator::RtkSolution;
 using estimator::SolutionStatus;
 
 namespace {
-
-/// Every number of a solution, to be compared bit by bit.
-std::vector<double> numbers(const RtkSolution& s) {
-  std::vector<double> v{static_cast<double>(s.tag.ns),
-                        static_cast<double>(s.time.ns),
-                        static_cast<double>(s.status),
-                        s.clock_offset_s,
-                        static_cast<double>(s.satellites),
-                        static_cast<double>(s.double_differences),
-                        static_cast<double>(s.phases),
-                        static_cast<double>(s.fixed_phases),
-                        std::isnan(s.base_age_s) ? -1 : s.base_age_s,
-                        static_cast<double>(s.verdict),
-                        s.success_rate,
-                        s.ratio,
-                        s.code_weight,
-                        s.phase_weight,
-                        static_cast<double>(s.held_integers),
-                        static_cast<double>(s.released_integers),
-                        static_cast<double>(s.iterations),
-                        static_cast<double>(s.restarted)};
-  for (int i = 0; i < 3; ++i) {
-    v.push_back(s.position_e_m[i]), v.push_back(s.velocity_e_mps[i]);
-    for (int j = 0; j < 3; ++j) v.push_back(s.covariance_enu_m2(i, j)), v.push_back(s.velocity_covariance_enu(i, j));
-  }
-  return v;
-}
 
 std::vector<double> run(const Drive& d, const RtkOptions& options = simulation_options()) {
   RtkUnderTest rtk = estimator_for(d, options);
@@ -46,7 +20,7 @@ std::vector<double> run(const Drive& d, const RtkOptions& options = simulation_o
       all.push_back(-1);
       continue;
     }
-    const auto v = numbers(*s);
+    const auto v = numbers_of(*s);
     all.insert(all.end(), v.begin(), v.end());
   }
   return all;
@@ -140,7 +114,7 @@ TEST_CASE("P19 two estimators interleaved do not disturb each other; P24 the sam
   RtkUnderTest rtk_a = estimator_for(a), rtk_b = estimator_for(b);
   std::vector<double> mixed_a, mixed_b;
   for (std::size_t k = 0; k < 15; ++k) {
-    const auto va = numbers(*feed(rtk_a, a, k)), vb = numbers(*feed(rtk_b, b, k));
+    const auto va = numbers_of(*feed(rtk_a, a, k)), vb = numbers_of(*feed(rtk_b, b, k));
     mixed_a.insert(mixed_a.end(), va.begin(), va.end());
     mixed_b.insert(mixed_b.end(), vb.begin(), vb.end());
   }
@@ -192,7 +166,7 @@ TEST_CASE("P22 refused epochs (duplicate, backward, nothing usable before the st
   CHECK_FALSE(rtk.update(empty).ok());
   std::vector<double> all;
   for (std::size_t k = 0; k < d.rover.size(); ++k) {
-    const auto v = numbers(*feed(rtk, d, k));
+    const auto v = numbers_of(*feed(rtk, d, k));
     all.insert(all.end(), v.begin(), v.end());
     const auto duplicate = rtk.update(d.rover[k]);
     CHECK(duplicate.status().code == StatusCode::duplicate);
@@ -223,7 +197,7 @@ TEST_CASE("P22 NaN, infinity, zero and absurd observations: every epoch answered
       CAPTURE(k);
       const auto s = feed(rtk, d, k);
       REQUIRE(s.ok());
-      for (double x : numbers(*s)) CHECK(std::isfinite(x));
+      for (double x : numbers_of(*s)) CHECK(std::isfinite(x));
       if (s->status != SolutionStatus::fix) continue;
       ++fixed;
       CHECK(d.error_m(*s) < 0.1);

@@ -83,7 +83,7 @@ TEST_CASE("simulated city: a wall 5 m to the west sends the signal from the east
 }
 
 TEST_CASE("simulated city: the extra path of a reflection is the detour over the mirror point") {
-  int found = 0;
+  unsigned found = 0;
   for_all_seeds(400, [&](Rng& rng) {
     const double angle = uniform(rng, 0, 6.28);
     const Eigen::Vector2d along{std::cos(angle), std::sin(angle)}, middle = random_vector<2>(rng, 30);
@@ -101,11 +101,11 @@ TEST_CASE("simulated city: the extra path of a reflection is the detour over the
     for (const Eigen::Vector3d& step : {Eigen::Vector3d{1e-2 * side}, Eigen::Vector3d{0, 0, 1e-2}})
       CHECK((satellite - seen->point_m - step).norm() + (seen->point_m + step - antenna).norm() >= over_m - 1e-6);
   });
-  CHECK(found > 30);
+  CHECK(found >= property_runs(400) / 15);  // most walls stand elsewhere
 }
 
 TEST_CASE("simulated city: the detour over a roof is the shortest way over its edge, and the loss begins with 6 dB") {
-  int bent = 0;
+  unsigned bent = 0;
   for_all_seeds(200, [&](Rng& rng) {
     City city;
     const Eigen::Vector2d a = Eigen::Vector2d{uniform(rng, 5, 25), -100}, b = Eigen::Vector2d{uniform(rng, 5, 25), 100};
@@ -125,7 +125,7 @@ TEST_CASE("simulated city: the detour over a roof is the shortest way over its e
     }
     CHECK(ray.detour_m == doctest::Approx(shortest).epsilon(1e-3));
   });
-  CHECK(bent > 50);
+  CHECK(bent >= property_runs(200) / 5);
   CHECK(simulator::knife_edge_loss_db(0, 0.19) == doctest::Approx(6.03).epsilon(0.01));
   CHECK(simulator::knife_edge_loss_db(1, 0.19) ==
         doctest::Approx(20 * std::log10(2 * std::numbers::pi * std::sqrt(2 / 0.19))).epsilon(0.05));

@@ -18,24 +18,11 @@
 #include "command_runner.hpp"
 #include "examples/simulator/dataset.hpp"
 #include "examples/support/rig.hpp"
+#include "simulated_files.hpp"
 
 using namespace searvins;
-
-namespace {
-
-simulator::SimulationOptions options_of(const char* profile, double duration_s, std::uint64_t seed) {
-  simulator::SimulationOptions options;
-  options.profile = profile, options.duration_s = duration_s, options.seed = seed;
-  return options;
-}
-
-const std::string& text_of(const simulator::Dataset& set, const std::string& name) {
-  const auto found = std::find_if(set.files.begin(), set.files.end(), [&](const auto& f) { return f.name == name; });
-  REQUIRE_MESSAGE(found != set.files.end(), name);
-  return found->text;
-}
-
-}  // namespace
+using test::options_of;
+using test::text_of;
 
 TEST_CASE("simulated files: the library reads them without skipping a line") {
   const simulator::Simulation drive(options_of("urban", 60, 2));

@@ -7,7 +7,6 @@
 
 #include <cstddef>
 #include <string>
-#include <tuple>
 #include <type_traits>
 #include <vector>
 
@@ -15,30 +14,12 @@
 #include <searvins/gnss/motion.hpp>
 #include <searvins/smoother/factor.hpp>
 
+#include "support/factor_values.hpp"
+
 namespace searvins::test {
 
 /// Values of states, ambiguities and pivot errors by key.
-class FactorValues {
- public:
-  template <class V>
-  smoother::Key<V> add(const V& value) {
-    auto& list = std::get<std::vector<V>>(lists_);
-    list.push_back(value);
-    return {static_cast<std::uint32_t>(list.size() - 1), 1};
-  }
-  template <class V>
-  [[nodiscard]] const V& operator()(const smoother::Key<V>& key) const {
-    REQUIRE(key.valid());
-    return std::get<std::vector<V>>(lists_).at(key.slot);
-  }
-  template <class V>
-  [[nodiscard]] V& at(const smoother::Key<V>& key) {
-    return std::get<std::vector<V>>(lists_).at(key.slot);
-  }
-
- private:
-  std::tuple<std::vector<gnss::Pva>, std::vector<gnss::Ambiguity>, std::vector<gnss::PivotError>> lists_{};
-};
+using FactorValues = FactorValuesOf<gnss::Pva, gnss::Ambiguity, gnss::PivotError>;
 
 /// Every column of the whitened Jacobian against central differences over the keys in the order of for_each_key, relative to the column's largest entry
 /// and to the spacing of the doubles that the residual was made from (`absolute`); linearise() gives the rows of evaluate().

@@ -11,24 +11,12 @@
 #include <searvins/imu/navigation_state.hpp>
 #include <searvins/smoother/factor.hpp>
 
+#include "support/factor_values.hpp"
 #include "support/property.hpp"
 
 namespace searvins::test {
 
-class NavigationValues {
- public:
-  smoother::Key<imu::NavigationState> add(const imu::NavigationState& x) {
-    states_.push_back(x);
-    return {static_cast<std::uint32_t>(states_.size() - 1), 1};
-  }
-  [[nodiscard]] const imu::NavigationState& operator()(const smoother::Key<imu::NavigationState>& key) const {
-    return states_.at(key.slot);
-  }
-  [[nodiscard]] imu::NavigationState& at(const smoother::Key<imu::NavigationState>& key) { return states_.at(key.slot); }
-
- private:
-  std::vector<imu::NavigationState> states_{};
-};
+using NavigationValues = FactorValuesOf<imu::NavigationState>;
 
 inline imu::NavigationState random_navigation_state(Rng& rng) {
   imu::NavigationState x;

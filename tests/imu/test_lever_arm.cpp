@@ -7,7 +7,6 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
-#include <tuple>
 #include <type_traits>
 #include <vector>
 
@@ -16,6 +15,7 @@
 
 #include "imu/factor_check.hpp"
 #include "imu/simulated_motion.hpp"
+#include "support/factor_values.hpp"
 #include "support/property.hpp"
 
 using namespace searvins;
@@ -108,26 +108,7 @@ TEST_CASE("along a true motion over the turning Earth the velocity is the deriva
 namespace {
 
 /// Values of navigation states, ambiguities and pivot errors by key.
-class BatchValues {
- public:
-  template <class V>
-  smoother::Key<V> add(const V& value) {
-    auto& list = std::get<std::vector<V>>(lists_);
-    list.push_back(value);
-    return {static_cast<std::uint32_t>(list.size() - 1), 1};
-  }
-  template <class V>
-  [[nodiscard]] const V& operator()(const smoother::Key<V>& key) const {
-    return std::get<std::vector<V>>(lists_).at(key.slot);
-  }
-  template <class V>
-  [[nodiscard]] V& at(const smoother::Key<V>& key) {
-    return std::get<std::vector<V>>(lists_).at(key.slot);
-  }
-
- private:
-  std::tuple<std::vector<NavigationState>, std::vector<gnss::Ambiguity>, std::vector<gnss::PivotError>> lists_{};
-};
+using BatchValues = FactorValuesOf<NavigationState, gnss::Ambiguity, gnss::PivotError>;
 
 /// Every column of the whitened Jacobian against central differences. Steps: half a metre, metre per second or cycle; half a milliradian of attitude,
 /// whose antenna moves on an arc.

@@ -2,6 +2,8 @@
 // Preintegration between arbitrary times: coverage, kinds of samples, range against online, re-integration, bad input.
 #include <searvins/imu/preintegration.hpp>
 
+#include <searvins/imu/preintegrated_motion.hpp>
+
 #include <algorithm>
 #include <cstring>
 #include <limits>

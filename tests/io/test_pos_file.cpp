@@ -2,9 +2,11 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <string>
 
+#include <searvins/imu/position_fix.hpp>
 #include <searvins/io/pos_file.hpp>
 
 #include "tests/support/property.hpp"
@@ -126,4 +128,15 @@ TEST_CASE(".pos: the receiver's positions of the recorded drive and walk, and th
   const auto walk = io::read_pos_file((*shared / "data/real/boulder_walk_2025/onboard_rtk.pos").string());
   REQUIRE(walk.ok());
   CHECK((walk.value[0].position_e_m - table.value[0].position_e_m).norm() < 0.05);
+}
+
+TEST_CASE("a position fix has a velocity when it is finite and has a sigma") {
+  imu::PositionFix fix;
+  CHECK_FALSE(fix.has_velocity());
+  fix.velocity_e_mps = {1, 2, 3};
+  CHECK_FALSE(fix.has_velocity());
+  fix.sigma_velocity_mps = 0.1;
+  CHECK(fix.has_velocity());
+  fix.velocity_e_mps.y() = std::numeric_limits<double>::quiet_NaN();
+  CHECK_FALSE(fix.has_velocity());
 }

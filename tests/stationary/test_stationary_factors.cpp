@@ -2,13 +2,13 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
-#include <tuple>
 #include <vector>
 
 #include <searvins/math/small_cholesky.hpp>
 #include <searvins/stationary/position_anchor.hpp>
 #include <searvins/stationary/stationary_factors.hpp>
 
+#include "tests/support/factor_values.hpp"
 #include "tests/support/property.hpp"
 
 using namespace searvins;
@@ -22,26 +22,7 @@ using test::uniform;
 namespace {
 
 /// Values of states and anchors by key.
-class Values {
- public:
-  template <class V>
-  smoother::Key<V> add(const V& value) {
-    auto& list = std::get<std::vector<V>>(lists_);
-    list.push_back(value);
-    return {static_cast<std::uint32_t>(list.size() - 1), 1};
-  }
-  template <class V>
-  [[nodiscard]] const V& operator()(const smoother::Key<V>& key) const {
-    return std::get<std::vector<V>>(lists_).at(key.slot);
-  }
-  template <class V>
-  [[nodiscard]] V& at(const smoother::Key<V>& key) {
-    return std::get<std::vector<V>>(lists_).at(key.slot);
-  }
-
- private:
-  std::tuple<std::vector<NavigationState>, std::vector<PositionAnchor>> lists_{};
-};
+using Values = test::FactorValuesOf<NavigationState, PositionAnchor>;
 
 /// Analytic Jacobian against central differences, column by column, relative to the largest entry of the whole Jacobian.
 template <class F>

@@ -49,7 +49,7 @@ struct EstimatorOptions {
   double realign_within_s{30};
 };
 
-/// See the file comment. Config: RtkConfig with FreeMotion.
+/// See the file comment. Form: robust::Batch, ScalarRows, LatentPivot or LatentPivotSymmetric.
 template <template <class> class Form, class CapacityType = HostedCapacity, class Earth = imu::RotatingEarth>
 class Estimator {
  public:
