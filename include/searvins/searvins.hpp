@@ -13,6 +13,7 @@
 
 #include <searvins/core/pool.hpp>
 #include <searvins/core/ring_buffer.hpp>
+#include <searvins/core/spsc_queue.hpp>
 #include <searvins/core/static_vector.hpp>
 #include <searvins/core/status.hpp>
 #include <searvins/core/time.hpp>
@@ -97,3 +98,23 @@
 #include <searvins/stationary/stationary_factors.hpp>
 
 #include <searvins/version.hpp>
+
+#include <searvins/vision/admission.hpp>
+#include <searvins/vision/admission_report.hpp>
+#include <searvins/vision/camera_model.hpp>
+#include <searvins/vision/camera_motion.hpp>
+#include <searvins/vision/frontend.hpp>
+#include <searvins/vision/image_view.hpp>
+#include <searvins/vision/landmark.hpp>
+#include <searvins/vision/motion_consistency.hpp>
+#include <searvins/vision/pnp.hpp>
+#include <searvins/vision/rectification.hpp>
+#include <searvins/vision/semantic_mask.hpp>
+#include <searvins/vision/spread.hpp>
+#include <searvins/vision/stereo_camera.hpp>
+#include <searvins/vision/stereo_factor.hpp>
+#include <searvins/vision/stereo_observation.hpp>
+#include <searvins/vision/stop_cue.hpp>
+#include <searvins/vision/three_point_alignment.hpp>
+#include <searvins/vision/track.hpp>
+#include <searvins/vision/triangulation.hpp>

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: BSD-3-Clause
+/// \file
+/// A frame sees a landmark with both eyes [paper eq. (stereo-factor)].
+///
+///     p_b = R_wb' (l - p_wb)        p_c = R_bc' (p_b - p_bc)
+///     e   = R (pi_s(p_c) - z)       R' R = (s^2 Sigma)^-1, Sigma of z = (uL, uR, v), s the scale from PnP's support
+///     rho(|e|) under Huber          an observation is one decision, so its three rows share a weight
+///
+/// With P = d pi_s / d p_c (stereo_camera.hpp) and A = R P R_bc',
+///
+///     d e / d theta = A [p_b]x        d e / d p_wb = -A R_wb'        d e / d l = A R_wb'
+///
+/// A landmark behind the camera, where pi_s is undefined. Optimisers commonly set the Jacobian to zero there: the point has no way back,
+/// its block is singular, and the update fails. An observation that counts for nothing there makes the forbidden place the cheapest one;
+/// one that jumps to another cost stops the step control of the whole window; and pi_s itself pulls with 1/z^2: a point at 0.1 m of a
+/// camera outweighs thousands at 20 m and would drag the vehicle, whatever the loss. So pi_s is continued by its tangent in depth
+/// (stereo_camera.hpp) where the point comes so near that the observation denies it anyway: where the predicted disparity exceeds the
+/// seen one, d, by d and ten of its sigmas,
+///
+///     z < z_t = fx B / (2 d + 10 s sigma_d)        sigma_d^2 = Sigma_11 + Sigma_22 - 2 Sigma_12,  d = 0 if negative
+///
+/// about half the depth that was seen. For z >= z_t, which is where residuals are less than gross, nothing differs from pi_s. Below,
+///
+///     - e is continuously differentiable for every landmark: step control compares honest costs, and there is no edge to stop at
+///     - d e / d l has full rank everywhere: the landmark's block is positive definite by one observation, without any prior
+///     - the depth that one observation asks for is reached from behind by Newton's method, in a few steps, without overshoot
+///     - a metre of depth costs (z_seen / z_t)^2 times the pixels that it costs at z_seen (from 4 where the disparity is many sigmas), so
+///       that the loss bounds the pull in metres too
+#pragma once
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+
+#include <searvins/core/status.hpp>
+#include <searvins/imu/imu_factor.hpp>
+#include <searvins/imu/navigation_state.hpp>
+#include <searvins/math/so3.hpp>
+#include <searvins/robust/loss.hpp>
+#include <searvins/smoother/factor.hpp>
+#include <searvins/vision/landmark.hpp>
+#include <searvins/vision/stereo_camera.hpp>
+
+namespace searvins::vision {
+
+/// Noise of an observation with the same sigma, independent, on uL, uR and v.
+[[nodiscard]] inline Eigen::Matrix3d pixel_covariance_px2(double sigma_px) { return sigma_px * sigma_px * Eigen::Matrix3d::Identity(); }
+
+/// See the file comment.
+template <robust::Loss Loss = robust::Huber<double>>
+struct StereoFactor {
+  using Scalar = double;
+  using State = imu::NavigationState;
+  static constexpr int max_rows = 3, max_keys = 2, max_columns = State::dof + Landmark::dof;
+  static constexpr const char* name = "stereo";
+  static constexpr double kGrossSigmas = 10;  ///< of disparity: see the file comment
+
+  smoother::Key<State> state{};
+  smoother::Key<Landmark> landmark{};
+  StereoCamera<double> camera{};
+  StereoPixel<double> pixel{StereoPixel<double>::Zero()};         ///< z
+  Eigen::Matrix3d root_information{Eigen::Matrix3d::Identity()};  ///< R, upper triangular, 1/px
+  Loss loss{};
+  double tangent_below_m{0};  ///< z_t
+
+  /// `covariance_px2`: Sigma. `support_scale`: s >= 1 of the frame's PnP, 1 where it was well supported.
+  /// Errors: invalid_argument (scale), non_finite (pixel), not_positive_definite (covariance, also NaN).
+  [[nodiscard]] static Result<StereoFactor> make(const smoother::Key<State>& state, const smoother::Key<Landmark>& landmark,
+                                                 const StereoCamera<double>& camera, const StereoPixel<double>& pixel,
+                                                 const Eigen::Matrix3d& covariance_px2, double support_scale = 1, const Loss& loss = {}) {
+    if (!(support_scale >= 1) || !std::isfinite(support_scale))
+      return failure(StatusCode::invalid_argument, "scale of a stereo observation's sigma must be 1 or more", -1, -1, support_scale);
+    if (!pixel.allFinite()) return failure(StatusCode::non_finite, "stereo observation with a NaN or infinity");
+    const auto root = imu::square_root_information<3>(covariance_px2);
+    if (!root) return root.status();
+    const double sigma_px =
+        support_scale * std::sqrt(covariance_px2(0, 0) + covariance_px2(1, 1) - covariance_px2(0, 1) - covariance_px2(1, 0));
+    const double nearest_px = 2 * std::max(pixel[0] - pixel[1], 0.0) + kGrossSigmas * sigma_px;
+    return StereoFactor{state, landmark, camera, pixel, *root / support_scale, loss, camera.depth_m(nearest_px)};
+  }
+
+  [[nodiscard]] int rows() const { return 3; }
+  template <class Visit>
+  void for_each_key(Visit&& visit) const {
+    visit(state), visit(landmark);
+  }
+  template <class Values>
+  void evaluate(const Values& values, double* e) const {
+    const State& x = values(state);
+    const Eigen::Vector3d p_b = x.R_wb.transpose() * (values(landmark).p_w_m - x.p_wb_m);
+    whiten(camera.continued(camera.camera_from_body(p_b), nullptr, tangent_below_m), e);
+  }
+  template <class Values>
+  void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
+    const State& x = values(state);
+    const Eigen::Vector3d p_b = x.R_wb.transpose() * (values(landmark).p_w_m - x.p_wb_m);
+    Eigen::Matrix3d P;
+    whiten(camera.continued(camera.camera_from_body(p_b), &P, tangent_below_m), e);
+    const Eigen::Matrix3d A = root_information * (P * camera.R_bc.transpose());
+    const Eigen::Matrix3d d_landmark = A * x.R_wb.transpose(), d_attitude = A * so3::skew(p_b);
+    for (int c = 0; c < 3; ++c)
+      for (int i = 0; i < 3; ++i) {
+        J(i, State::attitude + c) = d_attitude(i, c);
+        J(i, State::position + c) = -d_landmark(i, c);
+        J(i, State::dof + c) = d_landmark(i, c);
+      }
+  }
+  double weigh(const double* e, double* w) const {
+    const double z2 = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
+    std::fill_n(w, 3, loss.weight(z2));
+    return loss.rho(z2);
+  }
+
+ private:
+  void whiten(const StereoPixel<double>& predicted, double* e) const {
+    Eigen::Map<Eigen::Vector3d>{e} = root_information * (predicted - pixel);
+  }
+};
+
+static_assert(smoother::Factor<StereoFactor<>>);
+
+}  // namespace searvins::vision
