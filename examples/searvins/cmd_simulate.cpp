@@ -5,7 +5,9 @@
 #include <cstdio>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -16,6 +18,7 @@
 
 #include "examples/searvins/commands.hpp"
 #include "examples/simulator/dataset.hpp"
+#include "examples/simulator/image_set.hpp"
 #include "examples/support/option_parser.hpp"
 #include "examples/support/progress.hpp"
 #include "examples/support/table.hpp"
@@ -102,6 +105,39 @@ io::Diagnostic take_route(const std::string& path, bool has_duration, sim::Simul
   return {};
 }
 
+/// The size of the pictures, "640x240"; nothing (and a usage error) for what is none.
+std::optional<sim::RenderOptions> image_size(Options& options) {
+  const std::string given = options.text("images");
+  const std::size_t cross = given.find('x');
+  std::int64_t width = 0, height = 0;
+  const bool numbers = cross != std::string::npos && io::parse_integer(std::string_view{given}.substr(0, cross), width) &&
+                       io::parse_integer(std::string_view{given}.substr(cross + 1), height);
+  if (!numbers || width < 64 || height < 32 || width > 4096 || height > 4096) {
+    options.fail("--images: '" + given + "' is no size such as 640x240 (64x32 to 4096x4096)");
+    return std::nullopt;
+  }
+  sim::RenderOptions size;
+  size.width_px = static_cast<int>(width), size.height_px = static_cast<int>(height);
+  return size;
+}
+
+/// Renders the drive into the folder, beside the other files; the message of the result is empty when all is well.
+io::Diagnostic write_pictures(const sim::Simulation& simulation, sim::Layout layout, const sim::RenderOptions& size,
+                              const std::filesystem::path& folder) {
+  Progress progress("render", 100);
+  const io::Diagnostic wrong =
+      sim::write_images(simulation, size, folder, [&progress](double share) { progress.update(static_cast<std::size_t>(100 * share)); });
+  progress.finish();
+  if (!wrong.message.empty()) return wrong;
+  const sim::StereoRig rig = sim::scaled_rig(sim::StereoRig{}, size.width_px, size.height_px);
+  const std::string path = (folder / "rig_images.json").string();
+  if (const std::string failed = io::write_text_file(path, sim::rig_text(simulation, layout, rig)); !failed.empty())
+    return {path, 0, failed, "choose another folder with --out"};
+  std::printf("Pictures: %d pairs of %d x %d in cam0 and cam1, classes of the left ones in labels0; their camera is in rig_images.json.\n",
+              sim::image_count(simulation.options()), size.width_px, size.height_px);
+  return {};
+}
+
 void print_summary(const sim::Simulation& simulation, const sim::Dataset& set, const std::string& folder) {
   Table table(
       {"District", "Time s", "Satellites", "Clear", "Diffracted", "Reflected", "Blocked", "Tracked", "Bad signals %", "Locks", "Slips"});
@@ -141,11 +177,13 @@ int run_simulate(int argc, const char* const* argv) {
   parser.value("layout", "NAME", "names and forms of the files").one_of({"plain", "texcup"}).fallback("plain");
   parser.value("rover-rate", "HZ", "rate of the rover's receiver").one_of({"1", "2", "5", "10"}).fallback("1");
   parser.value("imu-sample", "KIND", "what an IMU row stands for").one_of({"instantaneous", "mean_to_stamp"}).fallback("instantaneous");
+  parser.value("images", "WxH", "also render pictures of this size, EuRoC layout, for example 640x240 (about 15 a second)");
   parser.epilogue("Nothing in the files was recorded. labels.csv holds the truth about every signal; do not use it to solve.");
   Options options = parser.parse(argc, argv);
   sim::SimulationOptions wanted;
   if (options.given("duration")) wanted.duration_s = options.number("duration", 10, 21600);
   const double seed = options.number("seed", 0, 1e9), rate = options.number("rover-rate", 1, 10);
+  const auto images = options.given("images") ? image_size(options) : std::nullopt;
   if (const auto code = options.finished()) return *code;
 
   wanted.profile = options.text("profile"), wanted.seed = static_cast<std::uint64_t>(seed), wanted.rover_rate_hz = rate;
@@ -173,14 +211,16 @@ int run_simulate(int argc, const char* const* argv) {
   if (failed) return unusable({folder.string(), 0, "could not be made: " + failed.message(), "choose another folder with --out"});
   Progress progress("simulate", 100);
   const sim::Simulation simulation(wanted);
-  const sim::Dataset set =
-      sim::make_dataset(simulation, options.text("layout") == "texcup" ? sim::Layout::texcup : sim::Layout::plain,
-                        [&progress](double share) { progress.update(static_cast<std::size_t>(std::max(0.0, 100 * share))); });
+  const sim::Layout layout = options.text("layout") == "texcup" ? sim::Layout::texcup : sim::Layout::plain;
+  const sim::Dataset set = sim::make_dataset(
+      simulation, layout, [&progress](double share) { progress.update(static_cast<std::size_t>(std::max(0.0, 100 * share))); });
   for (const sim::DatasetFile& file : set.files)
     if (const std::string wrong = io::write_text_file((folder / file.name).string(), file.text); !wrong.empty())
       return unusable({(folder / file.name).string(), 0, wrong, "choose another folder with --out"});
   progress.finish();
   print_summary(simulation, set, folder.string());
+  if (images)
+    if (const io::Diagnostic wrong = write_pictures(simulation, layout, *images, folder); !wrong.message.empty()) return unusable(wrong);
   return kExitDone;
 }
 

@@ -126,10 +126,9 @@ struct TruthRow {
   return text;
 }
 
-/// rig.json of the layout.
-[[nodiscard]] inline std::string rig_text(const Simulation& s, Layout layout) {
+/// rig.json of the layout, with the camera of the tracks or another.
+[[nodiscard]] inline std::string rig_text(const Simulation& s, Layout layout, const StereoRig& c = {}) {
   const ImuNoise& n = s.options().imu_noise;
-  const StereoRig c;
   const Eigen::Vector3d& lever = s.vehicle().lever_arm_b_m();
   std::string text = "{\n  \"schema\": 1,\n  \"imu\": {\n";
   text += formatted("    \"rate_hz\": %.10g,\n    \"sample\": \"%s\",\n    \"axes\": %s,\n", s.options().imu_rate_hz,

@@ -88,7 +88,7 @@ class StreetRoute {
     turn_offset_m_ = quarter_turn_offset_m(limits_.turn_length_m);
     turn_speed_mps_ = std::sqrt(limits_.lateral_mps2 * limits_.turn_length_m / (1.875 * std::numbers::pi / 2));
     wait(limits_.first_wait_s);
-    while (time_s_ < duration_s) drive_block(random);
+    while (ways_.empty() || time_s_ < duration_s) drive_block(random);  // a first wait may fill a short drive
     approach(way_m_, 0);
   }
 

@@ -143,6 +143,14 @@ TEST_CASE("simulated city: nothing stands in the way of the vehicle") {
   }
 }
 
+TEST_CASE("simulated city: a drive that ends before its first wait does") {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const simulator::Simulation drive(urban(5, seed));
+    REQUIRE(!drive.way().empty());
+    CHECK((drive.vehicle().antenna_w_m(5) - drive.vehicle().antenna_w_m(0)).norm() < 1e-3);
+  }
+}
+
 TEST_CASE("simulated city: labels agree with a walk along the rays, and the strength with the labels") {
   const simulator::Simulation drive(urban(120, 5));
   simulator::CityReceiver rover = drive.rover();
