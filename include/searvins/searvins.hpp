@@ -27,6 +27,7 @@
 #include <searvins/estimator/rtk_problem.hpp>
 #include <searvins/estimator/rtk_solution.hpp>
 #include <searvins/estimator/snapshot.hpp>
+#include <searvins/estimator/stereo_inertial_motion.hpp>
 
 #include <searvins/geodesy/local_frame.hpp>
 #include <searvins/geodesy/wgs84.hpp>

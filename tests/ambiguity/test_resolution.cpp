@@ -193,6 +193,31 @@ TEST_CASE("partial resolution drops an ambiguity with a bias and keeps the true 
   CHECK(recovered >= accepted * 9 / 10);  // now and then another subset fits the bias
 }
 
+TEST_CASE("a subset needs a ratio that grows as it shrinks: both sides of the bound") {
+  int subsets = 0;
+  for_all_seeds(100, [&](Rng& rng) {
+    Problem p{rng, integer(rng, 9, 12), 2, 0.3, 0.002};
+    p.error *= 0.5;
+    p.error[3 + integer(rng, 0, p.n - 1)] += 0.5;  // no integer fits: it has to go
+    ResolutionOptions options = open_gates(ResolutionMode::partial);
+    options.min_ratio = 2;
+    const Outcome out = resolve(p.as_float(), options);
+    if (!out.accepted() || out.count == p.n) return;
+    ++subsets;
+    const auto with_bound = [&](double ratio) {  // the setting is that of ten ambiguities
+      ResolutionOptions o = options;
+      o.min_ratio_partial = 1 + (ratio - 1) / std::sqrt(10.0 / out.count);
+      return resolve(p.as_float(), o);
+    };
+    const Outcome below = with_bound(0.999 * out.ratio), above = with_bound(1.001 * out.ratio);
+    CHECK(below.accepted());
+    CHECK(below.count == out.count);
+    CHECK_FALSE((above.accepted() && above.count == out.count));
+  });
+  MESSAGE(subsets << " subsets");
+  CHECK(subsets * 10 >= static_cast<int>(property_runs(100)));
+}
+
 TEST_CASE("a float that is wrong by far more than its small covariance is refused") {
   std::set<ResolutionVerdict> verdicts;
   for_all_seeds(200, [&](Rng& rng) {

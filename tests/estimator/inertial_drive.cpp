@@ -12,6 +12,27 @@
 namespace searvins::test {
 namespace {
 
+/// The simulator's stereo tracks and its camera.
+void add_frames(const simulator::Simulation& drive, InertialDrive& d) {
+  const simulator::StereoRig rig;
+  vision::StereoCamera<double>& c = d.camera;
+  c.fx_px = rig.fx_px, c.fy_px = rig.fy_px, c.cx_px = rig.cx_px, c.cy_px = rig.cy_px, c.baseline_m = rig.baseline_m;
+  c.width_px = static_cast<int>(rig.width_px), c.height_px = static_cast<int>(rig.height_px);
+  c.R_bc = rig.R_bc, c.p_bc_m = rig.t_bc_m;
+  simulator::StereoCamera camera = drive.camera();
+  for (int k = 0; k <= static_cast<int>(drive.options().duration_s * 10); ++k) {
+    auto& frame = d.frames.emplace_back();
+    frame.time = d.start.plus_seconds(k / 10.0);
+    for (const simulator::TrackObservation& o : camera.frame(drive.vehicle().state(k / 10.0))) {
+      vision::StereoObservation seen;
+      seen.track = static_cast<std::uint64_t>(o.track), seen.score = o.score;
+      seen.pixel_px = {o.u_left_px, o.u_right_px, o.v_px};
+      seen.semantic_class = static_cast<vision::SemanticClass>(o.semantic_class);
+      frame.add(seen);
+    }
+  }
+}
+
 InertialDrive made(simulator::SimulationOptions options, const DriveRates& rates) {
   options.rover_rate_hz = rates.rover_hz, options.imu_rate_hz = rates.imu_hz;
   const double duration_s = options.duration_s;
@@ -39,6 +60,7 @@ InertialDrive made(simulator::SimulationOptions options, const DriveRates& rates
     const simulator::ImuTruth m = sensor.measure(drive->vehicle(), k / rates.imu_hz);
     d.imu.push_back({d.start.plus_seconds(k / rates.imu_hz), m.w_ib_b_radps, m.f_b_mps2});
   }
+  if (rates.has_frames) add_frames(*drive, d);
   d.truth = [drive](GpsTime t) -> std::optional<DriveTruth> {
     const simulator::detail::TruthRow row = simulator::detail::truth_row(*drive, seconds_between(drive->options().start, t));
     return DriveTruth{row.antenna_e_m, row.R_enu_b};

@@ -16,6 +16,8 @@
 #include <searvins/estimator/estimator.hpp>
 #include <searvins/geodesy/local_frame.hpp>
 #include <searvins/geodesy/wgs84.hpp>
+#include <searvins/vision/stereo_camera.hpp>
+#include <searvins/vision/stereo_observation.hpp>
 
 #include "estimator/inertial_under_test.hpp"
 #include "estimator/solution_numbers.hpp"
@@ -40,6 +42,8 @@ struct InertialDrive {
   imu::SampleKind kind{imu::SampleKind::instantaneous};
   GpsTime start{};
   std::function<std::optional<DriveTruth>(GpsTime)> truth{};
+  std::vector<vision::StereoFrame<128>> frames{};  ///< only where they were asked for
+  vision::StereoCamera<double> camera{};
 
   [[nodiscard]] double seconds(GpsTime t) const { return seconds_between(start, t); }
 };
@@ -48,6 +52,7 @@ struct InertialDrive {
 struct DriveRates {
   double rover_hz{1}, imu_hz{100};
   imu::SampleKind kind{imu::SampleKind::instantaneous};
+  bool has_frames{false};  ///< stereo tracks at 10 Hz
 };
 
 /// A simulated drive: 20 s of standing, then streets. Profiles: open, light, urban.

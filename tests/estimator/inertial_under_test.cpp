@@ -25,6 +25,7 @@ Status InertialUnderTest::set_heading(double heading_rad, double sigma_rad) { re
 Status InertialUnderTest::add_imu(const imu::ImuSample& sample) { return impl_->estimator.add_imu(sample); }
 Status InertialUnderTest::add_base(const gnss::ObservationEpoch& epoch) { return impl_->estimator.add_base(epoch); }
 Status InertialUnderTest::add_rover(const gnss::ObservationEpoch& epoch) { return impl_->estimator.add_rover(epoch); }
+Status InertialUnderTest::add_position(const imu::PositionFix& fix) { return impl_->estimator.add_position(fix); }
 void InertialUnderTest::finish() { impl_->estimator.finish(); }
 Result<estimator::RtkSolution> InertialUnderTest::next() { return impl_->estimator.next(); }
 Result<estimator::RtkSolution> InertialUnderTest::predict(GpsTime time) const { return impl_->estimator.predict(time); }

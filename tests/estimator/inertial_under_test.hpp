@@ -32,6 +32,7 @@ class InertialUnderTest {
   Status add_imu(const imu::ImuSample& sample);
   Status add_base(const gnss::ObservationEpoch& epoch);
   Status add_rover(const gnss::ObservationEpoch& epoch);
+  Status add_position(const imu::PositionFix& fix);
   void finish();
   Result<estimator::RtkSolution> next();
   [[nodiscard]] Result<estimator::RtkSolution> predict(GpsTime time) const;

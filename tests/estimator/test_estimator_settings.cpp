@@ -110,6 +110,13 @@ const Flip kMovingStart[] = {{"inertial.preintegration.noise.gyro_bias_sigma",
                               [](EstimatorOptions& o) { o.inertial.preintegration.noise.gyro_bias_sigma_radps *= 3; }}};
 const Flip kJumps[] = {{"inertial.fix_jump_floor_m", [](EstimatorOptions& o) { o.inertial.fix_jump_floor_m = 10; }}};
 
+const Flip kAnchors[] = {
+    {"inertial.position_anchor", [](EstimatorOptions& o) { o.inertial.position_anchor = false; }},
+    {"inertial.anchor_sigma_m", [](EstimatorOptions& o) { o.inertial.anchor_sigma_m = 0.2; }},
+    {"inertial.anchor_prior_scale", [](EstimatorOptions& o) { o.inertial.anchor_prior_scale = 1; }},
+    {"inertial.anchor_floor_m", [](EstimatorOptions& o) { o.inertial.anchor_floor_m = 1; }},
+};
+
 template <std::size_t N>
 void check_flips(const Eventful& e, const EstimatorOptions& reference, const Flip (&flips)[N]) {
   const std::vector<double> before = e.outputs(reference);
@@ -141,6 +148,9 @@ TEST_CASE("P12 every settings field of the inertial estimator changes some outpu
   check_flips(moving, options, kMovingStart);
   jumps.inertial.max_fix_jump_statistic = 1e-4;
   check_flips(e, jumps, kJumps);
+  EstimatorOptions floating = options;  // integers would make the anchor needless
+  floating.rtk.resolution.mode = ambiguity::ResolutionMode::off;
+  check_flips(e, floating, kAnchors);
 }
 
 TEST_CASE("a minute of readings and epochs, GNSS alone, aligned, bridged and aligned anew, without one heap allocation") {

@@ -32,7 +32,7 @@ imu::ImuSample reading(std::int64_t k, const Eigen::Vector3d& gyro = {0, 0, 0}, 
 std::unique_ptr<Inertial> policy_at(const NavigationState& x, const InertialOptions& options = {}) {
   auto motion = std::make_unique<Inertial>(estimator::RtkOptions{}, options);
   motion->set_frame(geodesy::LocalFrame::at({-3959400.631, 3385704.533, 3667523.111}));
-  motion->settle(x, imu::NavigationCovariance::Identity() * 1e-4, GpsTime{0});
+  motion->settle(x, imu::NavigationCovariance::Identity() * 1e-4, GpsTime{0}, true);
   for (std::int64_t k = 0; k <= 100; ++k) REQUIRE(motion->add_sample(reading(k)).ok());
   return motion;
 }

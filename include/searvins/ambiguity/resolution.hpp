@@ -18,9 +18,12 @@
 ///
 ///     success rate    P_B > 0.86
 ///     norm            (z - a)' Q_aa^-1 (z - a) <= chi-square quantile: the integers agree with the float's own covariance
-///     ratio           second best over best squared norm, with a higher bound for a subset
+///     ratio           second best over best squared norm, with a higher bound for a subset, and more so for a small one
 ///     covariance      horizontal and vertical sigma after fixing small enough
 ///     innovation      dp' (Q_pa Q_aa^-1 Q_ap)^-1 dp <= 16.27 (99.9 % of chi-square 3), and dp not larger than a bound in metres
+///
+/// Under wrong integers the squared norms of n ambiguities spread by sqrt(2 n) about their mean n, so chance alone makes ratios whose distance from 1 goes
+/// with 1 / sqrt n: the bound of a subset, 1 + (r - 1) sqrt(10 / n), has its r at ten ambiguities.
 ///
 /// Partial mode takes ambiguities out one by one until all gates pass or too few are left: while the success rate is short, the least precise one;
 /// afterwards the one that contradicts the candidate most, which is the largest drop of the squared norm,
@@ -73,7 +76,7 @@ struct ResolutionOptions {
   ResolutionMode mode{ResolutionMode::partial};
   double min_success_rate{0.86};
   double min_ratio{2};                  ///< second over best squared norm; 1 switches the test off
-  double min_ratio_partial{5};          ///< the same for a subset: it was chosen for agreeing with its integers, so it must do so more clearly
+  double min_ratio_partial{7};          ///< the same for a subset of ten: it was chosen for agreeing with its integers, so it must do so more clearly
   double norm_confidence{0.9999};       ///< of the chi-square bound on the best squared norm
   int min_ambiguities{5};
   double min_share_partial{0.5};        ///< a subset holds at least this share of the ambiguities that were offered
@@ -160,9 +163,13 @@ class Resolver {
     if (!condition(f, out)) return ResolutionVerdict::ill_conditioned;
     const auto bound = math::chi_square_quantile(options.norm_confidence, m_);
     if (bound.ok() && out.squared_norm > *bound) return ResolutionVerdict::norm;
-    const double least_ratio = m_ < f.n ? std::max(options.min_ratio, options.min_ratio_partial) : options.min_ratio;
-    if (out.ratio < least_ratio) return ResolutionVerdict::ratio;
+    if (out.ratio < least_ratio(options, m_ < f.n)) return ResolutionVerdict::ratio;
     return judge_position(f, options, out);
+  }
+
+  [[nodiscard]] double least_ratio(const ResolutionOptions& options, bool is_subset) const {
+    if (!is_subset) return options.min_ratio;
+    return std::max(options.min_ratio, 1 + (options.min_ratio_partial - 1) * std::sqrt(10.0 / m_));
   }
 
   /// Conditions the position on the candidate: dp, Q_p|a, and Q^-1 v for the choice of what to drop.

@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// \file
-/// RTK and inertial navigation from the first epoch on: the estimator that most users touch.
+/// RTK, inertial unit and stereo camera from the first epoch on: the estimator that most users touch.
 ///
-/// Readings, base and rover epochs come in any order within the declared latency; next() answers one solution after the other, in time order:
+/// Readings, base and rover epochs, and frames come in any order within the declared latency; next() answers one solution after the other, in time order:
 ///
 ///     before alignment   GNSS alone (RtkEstimator<FreeMotion>); its velocities and positions align the unit (imu/initializer.hpp)
 ///     aligned            navigation states, tightly coupled (RtkEstimator<InertialMotion>)
 ///     positions          instead of rover epochs: loosely coupled to another program's positions
+///     frames             with a motion that has a camera, from alignment on: a state each (stereo_inertial_motion.hpp)
 ///     no rover epoch     states from the inertial unit alone, every silence_s, labelled dr
 ///     readings missing   GNSS alone again, until readings are back and aligned
 ///
-/// A rover epoch is answered when readings reach past it, or when the newest input is later than it by the latency: nothing waits for ever. A window that
+/// An epoch or frame is answered when readings reach past it and the rhythms of the other streams put nothing of its time or before it that has not come,
+/// or when the newest input is later than it by the latency: nothing waits for ever. A window that
 /// had to be given up several times in a row is taken for a wrong alignment, which is then made anew.
 ///
 /// The object is about a hundred megabytes with HostedCapacity and never allocates: create it once, static or on the heap, never as a local.
@@ -21,6 +23,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <optional>
+#include <utility>
 
 #include <searvins/core/ring_buffer.hpp>
 #include <searvins/core/status.hpp>
@@ -39,9 +42,10 @@
 namespace searvins::estimator {
 
 /// Settings. The unit's noise and the lever arm are those of `inertial`, also for the initialisation.
-struct EstimatorOptions {
+template <class MotionOptions>
+struct BasicEstimatorOptions {
   RtkOptions rtk{};
-  InertialOptions inertial{};
+  MotionOptions inertial{};
   imu::InitializerSettings initializer{};
   double latency_s{0.2};       ///< how much later than the rest a stream may come
   double silence_s{1};         ///< a state from the inertial unit alone after this time without a rover epoch
@@ -49,13 +53,54 @@ struct EstimatorOptions {
   double realign_within_s{30};
 };
 
-/// See the file comment. Form: robust::Batch, ScalarRows, LatentPivot or LatentPivotSymmetric.
-template <template <class> class Form, class CapacityType = HostedCapacity, class Earth = imu::RotatingEarth>
+using EstimatorOptions = BasicEstimatorOptions<InertialOptions>;
+
+/// When the next of a stream that comes at even intervals is due.
+class Rhythm {
+ public:
+  void note(GpsTime t) {
+    const double step_s = has_any_ ? seconds_between(newest_, t) : 0;
+    if (!(interval_s_ > 0) || step_s < 1.5 * interval_s_) interval_s_ = step_s;  // a gap is no rhythm
+    newest_ = t, has_any_ = true;
+  }
+  /// Whether one of about time `t` (`margin_s`) or before it is still to come.
+  [[nodiscard]] bool may_come(GpsTime t, double margin_s) const {
+    if (has_any_ && newest_ >= t.plus_seconds(-margin_s)) return false;
+    return !(interval_s_ > 0) || seconds_between(newest_, t) > interval_s_ - margin_s;  // its rhythm may not be known yet
+  }
+  /// The same, but a stream that has been silent for longer than its rhythm is not waited for.
+  [[nodiscard]] bool is_to_come(GpsTime t, double margin_s) const {
+    return may_come(t, margin_s) && (!(interval_s_ > 0) || seconds_between(newest_, t) < 2 * interval_s_);
+  }
+  [[nodiscard]] bool has_any() const { return has_any_; }
+
+ private:
+  GpsTime newest_{};
+  double interval_s_{0};
+  bool has_any_{false};
+};
+
+/// The capacity of the part without a camera: WithoutCamera of a capacity that has landmarks, else the capacity itself.
+template <class C>
+struct WithoutCamera {
+  using type = C;
+};
+template <class C>
+  requires requires { typename C::WithoutCamera; }
+struct WithoutCamera<C> {
+  using type = typename C::WithoutCamera;
+};
+
+/// See the file comment. Form: robust::Batch, ScalarRows, LatentPivot or LatentPivotSymmetric. Motion: InertialMotion<>, or StereoInertialMotion<> with a
+/// capacity that has landmarks.
+template <template <class> class Form, class CapacityType = HostedCapacity, class MotionType = InertialMotion<>>
 class Estimator {
  public:
-  using Free = RtkEstimator<RtkConfig<Form, CapacityType>>;
-  using Bound = RtkEstimator<RtkConfig<Form, CapacityType, InertialMotion<Earth>>>;
-  using Options = EstimatorOptions;
+  using Motion = MotionType;
+  using Earth = typename Motion::EarthType;
+  using Free = RtkEstimator<RtkConfig<Form, typename WithoutCamera<CapacityType>::type>>;
+  using Bound = RtkEstimator<RtkConfig<Form, CapacityType, Motion>>;
+  using Options = BasicEstimatorOptions<typename Motion::Options>;
 
   explicit Estimator(const Options& options = {})
       : options_(options), free_(options.rtk), bound_(inertial_rtk(options.rtk), {}, {}, options.inertial), initializer_(initializer_settings(options)),
@@ -90,7 +135,9 @@ class Estimator {
   /// A base epoch, in time order. Errors: duplicate, out_of_order.
   Status add_base(const gnss::ObservationEpoch& epoch) {
     (void)bound_.add_base(epoch);
-    return free_.add_base(epoch);
+    const Status s = free_.add_base(epoch);
+    if (s.ok()) base_rhythm_.note(epoch.tag);
+    return s;
   }
   /// A rover epoch, in time order. Errors: duplicate, out_of_order (also: later than the latency), capacity_exceeded.
   Status add_rover(const gnss::ObservationEpoch& epoch) {
@@ -99,6 +146,7 @@ class Estimator {
     if (is_answered(epoch.tag)) return failure(StatusCode::out_of_order, "rover epoch later than the declared latency");
     if (!epochs_.push(epoch)) return failure(StatusCode::capacity_exceeded, "rover epochs wait for next(): take solutions more often");
     has_rover_ = true, newest_rover_ = epoch.tag;
+    rover_rhythm_.note(epoch.tag);
     see(epoch.tag);
     return ok_status();
   }
@@ -109,7 +157,22 @@ class Estimator {
     if (is_answered(fix.time)) return failure(StatusCode::out_of_order, "position later than the declared latency");
     if (!positions_.push(fix)) return failure(StatusCode::capacity_exceeded, "positions wait for next(): take solutions more often");
     has_rover_ = true, newest_rover_ = fix.time;
+    rover_rhythm_.note(fix.time);
     see(fix.time);
+    return ok_status();
+  }
+  /// A frame, in time order. Those from before the alignment are let go. Errors: duplicate, out_of_order (also: later than the latency),
+  /// capacity_exceeded.
+  template <class Frame>
+  Status add_stereo(const Frame& frame) {
+    static_assert(Motion::has_camera, "Estimator needs a motion with a camera: StereoInertialMotion<>");
+    if (has_frame_time_ && frame.time <= newest_frame_)
+      return failure(frame.time == newest_frame_ ? StatusCode::duplicate : StatusCode::out_of_order, "stereo frame not after the last one");
+    if (is_answered(frame.time.plus_seconds(kClockMarginS))) return failure(StatusCode::out_of_order, "stereo frame later than the declared latency");
+    if (!frames_.push(frame)) return failure(StatusCode::capacity_exceeded, "stereo frames wait for next(): take solutions more often");
+    has_frame_time_ = true, newest_frame_ = frame.time;
+    frame_rhythm_.note(frame.time);
+    see(frame.time);
     return ok_status();
   }
   /// No more input will come: what waits is due.
@@ -117,13 +180,22 @@ class Estimator {
 
   /// The next solution that is due. Errors: no_data when none is; else what is wrong with the epoch that was next (it is gone then).
   Result<RtkSolution> next() {
-    if (!epochs_.empty() && is_due(epochs_.front().tag)) {
+    if constexpr (Motion::has_camera)
+      while (is_frame_next()) {
+        if (!is_frame_due(frames_.front().time)) return failure(StatusCode::no_data, "no solution is due");
+        stereo_frame_ = frames_.front();
+        frames_.pop();
+        Result<RtkSolution> seen = solve(stereo_frame_);
+        if (seen.ok()) return answer(std::move(seen));
+        if (seen.status().code != StatusCode::no_data) ++refused_frames_, frame_status_ = seen.status();
+      }
+    if (!epochs_.empty() && is_due(epochs_.front().tag, true)) {
       // Copied: the queue's place may be taken while the epoch is worked on.
       epoch_ = epochs_.front();
       epochs_.pop();
       return answer(solve(epoch_));
     }
-    if (!positions_.empty() && is_due(positions_.front().time)) {
+    if (!positions_.empty() && is_due(positions_.front().time, false)) {
       const imu::PositionFix fix = positions_.front();
       positions_.pop();
       return answer(solve(fix));
@@ -146,6 +218,9 @@ class Estimator {
   [[nodiscard]] imu::HeadingSource heading_source() const { return initializer_.heading_source(); }
   [[nodiscard]] const char* waiting_text() const { return aligned_ ? imu::text_of(imu::AlignmentWait::nothing) : initializer_.waiting_text(); }
   [[nodiscard]] int alignments() const { return alignments_; }
+  /// Frames that next() could not use, and why the last of them: later than a newer state, or a calibration that is none.
+  [[nodiscard]] long refused_frames() const { return refused_frames_; }
+  [[nodiscard]] const Status& frame_status() const { return frame_status_; }
   /// The estimator that gave the last solution, for reports.
   [[nodiscard]] const gnss::DifferencedEpoch& differenced() const { return aligned_ ? bound_.differenced() : free_.differenced(); }
   [[nodiscard]] const gnss::SinglePointSolution& single_point() const { return aligned_ ? bound_.single_point() : free_.single_point(); }
@@ -153,6 +228,22 @@ class Estimator {
   [[nodiscard]] const Free& gnss_only() const { return free_; }
 
  private:
+  struct NoFrame {};
+  struct NoFrames {
+    [[nodiscard]] static bool empty() { return true; }
+  };
+  template <class M>
+  struct FrameTypes {
+    using Frame = NoFrame;
+    using Queue = NoFrames;
+  };
+  template <class M>
+    requires M::has_camera
+  struct FrameTypes<M> {
+    using Frame = typename M::Frame;
+    using Queue = RingBuffer<Frame, 16>;
+  };
+
   static constexpr double kNoVelocityMps = 1e3;  ///< sigma of a velocity that there is none of
   static constexpr double kClockMarginS = 0.03;  ///< a state's time lies this much around its epoch's tag
 
@@ -173,13 +264,32 @@ class Estimator {
     if (!has_input_ || t > newest_input_) newest_input_ = t;
     has_input_ = true;
   }
-  /// Readings reach past the epoch, or nobody may wait any longer.
-  [[nodiscard]] bool is_due(GpsTime tag) const {
-    return finished_ || (has_imu_ && newest_imu_ >= tag.plus_seconds(kClockMarginS)) || seconds_between(tag, newest_input_) > options_.latency_s;
+  /// Readings reach past the epoch and the base is there, or nobody may wait any longer.
+  [[nodiscard]] bool is_due(GpsTime tag, bool needs_base) const {
+    if (finished_ || seconds_between(tag, newest_input_) > options_.latency_s) return true;
+    if (needs_base && base_rhythm_.is_to_come(tag, kClockMarginS)) return false;
+    if (frame_rhythm_.has_any() && frame_rhythm_.is_to_come(tag, kClockMarginS)) return false;
+    return has_imu_ && newest_imu_ >= tag.plus_seconds(kClockMarginS);
+  }
+  /// The same for a frame, which waits for what the rover may still say of its time: also for a rover that has been silent, whose first epoch would come
+  /// too late else.
+  [[nodiscard]] bool is_frame_due(GpsTime time) const {
+    if (finished_ || seconds_between(time, newest_input_) > options_.latency_s) return true;
+    return has_imu_ && newest_imu_ >= time && !rover_rhythm_.may_come(time, kClockMarginS);
+  }
+  /// Whether a frame comes before everything else that waits. An epoch of about its time makes the state that both share.
+  [[nodiscard]] bool is_frame_next() const {
+    if constexpr (Motion::has_camera) {
+      if (frames_.empty()) return false;
+      const GpsTime shared = frames_.front().time.plus_seconds(options_.rtk.shared_state_s);
+      return (epochs_.empty() || epochs_.front().tag > shared) && (positions_.empty() || positions_.front().time > shared);
+    } else {
+      return false;
+    }
   }
   /// Readings reach further than a rover epoch may still be missing for.
   [[nodiscard]] bool is_silent() const {
-    if (!aligned_ || !epochs_.empty() || !positions_.empty()) return false;
+    if (!aligned_ || !epochs_.empty() || !positions_.empty() || !frames_.empty()) return false;
     const GpsTime next = bound_.state_time().plus_seconds(options_.silence_s);
     return has_imu_ && newest_imu_ >= next.plus_seconds(finished_ ? 0.0 : options_.latency_s);
   }
@@ -188,13 +298,12 @@ class Estimator {
     if (aligned_) look_ahead();
     if (!solution.ok()) return solution;
     has_answered_ = true, answered_ = solution->tag;
-    answered_by_readings_ = solution->status == SolutionStatus::dr;
+    const bool by_epoch = solution->source == SolutionSource::rover && solution->status != SolutionStatus::dr;
+    answered_margin_s_ = by_epoch ? 0 : solution->source == SolutionSource::camera ? options_.rtk.shared_state_s : kClockMarginS;
     return solution;
   }
-  /// Whether the time of a rover epoch has been answered for. A state from readings alone knows its receiver tag to the clock's drift only.
-  [[nodiscard]] bool is_answered(GpsTime tag) const {
-    return has_answered_ && tag <= (answered_by_readings_ ? answered_.plus_seconds(kClockMarginS) : answered_);
-  }
+  /// Whether the time of a rover epoch has been answered for. A state from readings or a frame knows its receiver tag to the clock's drift only.
+  [[nodiscard]] bool is_answered(GpsTime tag) const { return has_answered_ && tag <= answered_.plus_seconds(answered_margin_s_); }
 
   /// Integrates ahead of the newest state, for predict().
   void look_ahead() {
@@ -238,8 +347,21 @@ class Estimator {
     return solution;
   }
 
+  /// The same for a frame. Before alignment there is nothing for it to say.
+  template <class Frame>
+  [[nodiscard]] Result<RtkSolution> solve(const Frame& frame) {
+    if (aligned_ && frame.time < bound_.state_time().plus_seconds(-options_.rtk.shared_state_s))
+      return failure(StatusCode::out_of_order, "stereo frame before the newest state");
+    if (aligned_) feed_motion(frame.time);
+    if (!aligned_ || !bound_.motion().covers(frame.time)) return failure(StatusCode::no_data, "the unit is not aligned");
+    const Result<RtkSolution> solution = bound_.see(frame);
+    if (solution.ok()) watch(*solution);
+    return solution;
+  }
+
   [[nodiscard]] static RtkSolution solution_of(const imu::PositionFix& fix) {
     RtkSolution s;
+    s.source = SolutionSource::position;
     s.tag = s.time = fix.time;
     s.status = Bound::status_of_quality(fix.quality);
     s.position_e_m = fix.position_e_m;
@@ -330,8 +452,14 @@ class Estimator {
   RingBuffer<imu::PositionFix, 64> positions_{};
   gnss::ObservationEpoch epoch_{};
   imu::ImuSample last_sample_{};
-  GpsTime newest_imu_{}, newest_rover_{}, newest_input_{}, answered_{}, last_restart_{};
-  bool has_imu_{false}, has_rover_{false}, has_input_{false}, has_answered_{false}, has_frame_{false}, answered_by_readings_{false}, aligned_{false}, finished_{false};
+  typename FrameTypes<Motion>::Queue frames_{};
+  typename FrameTypes<Motion>::Frame stereo_frame_{};
+  Rhythm base_rhythm_{}, rover_rhythm_{}, frame_rhythm_{};
+  GpsTime newest_imu_{}, newest_rover_{}, newest_frame_{}, newest_input_{}, answered_{}, last_restart_{};
+  double answered_margin_s_{0};
+  long refused_frames_{0};
+  Status frame_status_{};
+  bool has_frame_time_{false}, has_imu_{false}, has_rover_{false}, has_input_{false}, has_answered_{false}, has_frame_{false}, aligned_{false}, finished_{false};
   int alignments_{0}, restarts_{0};
 };
 

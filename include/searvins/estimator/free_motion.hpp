@@ -24,7 +24,7 @@ namespace searvins::estimator {
 /// See the file comment.
 class FreeMotion {
  public:
-  static constexpr bool is_inertial = false;
+  static constexpr bool is_inertial = false, has_camera = false;
   using State = gnss::Pva;
   using Antenna = gnss::DirectAntenna;
   using Covariance = Eigen::Matrix<double, State::dof, State::dof>;
@@ -74,7 +74,10 @@ class FreeMotion {
     return smoother.add_factor(gnss::WhiteJerkFactor{from, to, std::max(1e-3, seconds_between(from_time, to_time)), options_.jerk_psd_m2ps5}).status();
   }
   /// The newest state was estimated.
-  void settle(const State&, const Covariance&, GpsTime) {}
+  void settle(const State&, const Covariance&, GpsTime, bool) {}
+  /// The oldest state is about to leave the window.
+  template <class Smoother>
+  void before_marginalising(Smoother&, smoother::Key<State>) {}
   /// Attitude and biases: none.
   void describe(const State&, const Covariance&, const Eigen::Matrix3d&, RtkSolution&) const {}
 

@@ -3,7 +3,9 @@
 /// The motion of an estimator with an inertial unit: navigation states tied by preintegrated readings, and held when the vehicle stands.
 ///
 /// Between states the policy integrates what add_sample() brings; a state may be placed wherever readings reach (covers()). While the detector sees a
-/// rest, each state gets a zero velocity and a zero angular rate, unless the state's own prediction says that the vehicle moves.
+/// rest, each state gets a zero velocity and a zero angular rate, unless the state's own prediction says that the vehicle moves. While no integers are
+/// held in a rest, its states also share a place (stationary/position_anchor.hpp), latched where the rest began or the integers ended; its prior is
+/// widened, because the states of the window hold the same information already.
 ///
 /// The antenna of a state is a lever arm away and swings with the body (imu/lever_arm.hpp). Its covariance follows from that of the state by the
 /// Jacobians of both.
@@ -33,6 +35,7 @@
 #include <searvins/imu/prediction.hpp>
 #include <searvins/imu/preintegration.hpp>
 #include <searvins/stationary/detector.hpp>
+#include <searvins/stationary/position_anchor.hpp>
 #include <searvins/stationary/stationary_factors.hpp>
 
 namespace searvins::estimator {
@@ -45,6 +48,9 @@ struct InertialOptions {
   double position_floor_m{0.05};                           ///< sigma that is added to positions from elsewhere
   bool zero_velocity{true}, zero_angular_rate{true};       ///< hold states at rest
   double zero_velocity_sigma_mps{0.03}, zero_rate_sigma_radps{1e-3};
+  bool position_anchor{true};                              ///< states of a rest without integers share a place
+  double anchor_sigma_m{0.02};                             ///< of a state from the place
+  double anchor_prior_scale{3}, anchor_floor_m{0.05};      ///< the latched prior's sigmas: those of the state times the scale, and the floor
   double max_rest_speed_sigmas{3};                         ///< a rest is not believed when the prediction moves faster than this, and than
   double max_rest_speed_mps{0.3};                          ///< this speed
   /// Integers that would move the antenna further than this from its prediction are not believed, and neither are those that the prediction rests on:
@@ -60,17 +66,19 @@ struct InertialOptions {
 template <class Earth = imu::RotatingEarth, std::size_t SampleCapacity = 8192>
 class InertialMotion {
  public:
-  static constexpr bool is_inertial = true;
+  static constexpr bool is_inertial = true, has_camera = false;
+  using EarthType = Earth;
   using State = imu::NavigationState;
   using Antenna = imu::LeverArm;
   using Options = InertialOptions;
   using Covariance = imu::NavigationCovariance;
   template <class Cap>
-  using Variables = smoother::Types<>;
+  using Variables = smoother::Types<smoother::Capacity<stationary::PositionAnchor, 4>>;
   template <class Cap>
   using Factors = smoother::Types<smoother::Capacity<imu::NavigationPriorFactor, 1>, smoother::Capacity<imu::ImuFactor<Earth>, Cap::states>,
                                   smoother::Capacity<stationary::ZeroVelocityFactor, Cap::states>, smoother::Capacity<stationary::ZeroAngularRateFactor, Cap::states>,
-                                  smoother::Capacity<stationary::NonHolonomicFactor, Cap::states>, smoother::Capacity<imu::PositionFactor, Cap::states>>;
+                                  smoother::Capacity<stationary::NonHolonomicFactor, Cap::states>, smoother::Capacity<imu::PositionFactor, Cap::states>,
+                                  smoother::Capacity<stationary::PositionAnchorFactor, Cap::states>, smoother::Capacity<stationary::PositionAnchorPriorFactor, 4>>;
 
   explicit InertialMotion(const RtkOptions&, const Options& options = {}) : options_(options), detector_(options.preintegration.noise, options.detector) {}
 
@@ -158,9 +166,20 @@ class InertialMotion {
     if (const Status s = smoother.add_factor(*factor).status(); !s.ok()) return s;
     out.stationary = is_at_rest(*smoother.find(to));
     if (out.stationary) hold(smoother, to);
+    if (!out.stationary || !options_.position_anchor)
+      anchor_ = {};
+    else
+      hold_place(smoother, to, to_time, imu::predict(*smoother.find(from), *motion, earth_).p_wb_m);
     if (options_.non_holonomic && !out.stationary && smoother.find(to)->v_wb_mps.norm() > options_.non_holonomic_from_mps) keep_on_wheels(smoother, to, to_time);
     return ok_status();
   }
+
+  /// The oldest state is about to leave the window.
+  template <class Smoother>
+  void before_marginalising(Smoother&, smoother::Key<State>) {}
+
+  /// Another sensor's opinion that the vehicle stands; it counts as that of the detector does.
+  void set_rest_cue(bool stands) { rest_cue_ = stands; }
 
   /// Adds a position from elsewhere to a state.
   template <class Smoother>
@@ -171,8 +190,9 @@ class InertialMotion {
     return factor.ok() ? smoother.add_factor(*factor).status() : factor.status();
   }
 
-  /// The newest state was estimated: the next interval begins there.
-  void settle(const State& x, const Covariance& P, GpsTime t) {
+  /// The newest state was estimated: the next interval begins there. is_float: no integer had a part in it.
+  void settle(const State& x, const Covariance& P, GpsTime t, bool is_float) {
+    is_float_ = is_float, position_covariance_m2_ = P.block<3, 3>(State::position, State::position);
     sigma_velocity_mps_ = std::sqrt(std::max(1e-6, P.block<3, 3>(State::velocity, State::velocity).trace() / 3));
     if (!integration_.restart(t, imu::bias_of(x)).ok()) (void)integration_.start(t, imu::bias_of(x), options_.preintegration);
     detector_.set_speed_hint(t, x.v_wb_mps.norm(), sigma_velocity_mps_);
@@ -202,13 +222,28 @@ class InertialMotion {
 
   [[nodiscard]] bool is_at_rest(const State& predicted) const {
     const double speed = predicted.v_wb_mps.norm();
-    return detector_.stationary() && speed < std::max(options_.max_rest_speed_mps, options_.max_rest_speed_sigmas * sigma_velocity_mps_);
+    return (detector_.stationary() || rest_cue_) && speed < std::max(options_.max_rest_speed_mps, options_.max_rest_speed_sigmas * sigma_velocity_mps_);
   }
   template <class Smoother>
   void hold(Smoother& smoother, smoother::Key<State> key) const {
     if (options_.zero_velocity) (void)smoother.add_factor(stationary::ZeroVelocityFactor{key, options_.zero_velocity_sigma_mps});
     if (options_.zero_angular_rate)
       (void)smoother.add_factor(stationary::ZeroAngularRateFactor{key, detector_.mean_gyro_b_radps(), earth_.rate_w_radps(), options_.zero_rate_sigma_radps});
+  }
+  /// Ties a state at rest to the anchor. There must be none before: the prior would carry what integers said into the float.
+  template <class Smoother>
+  void hold_place(Smoother& smoother, smoother::Key<State> key, GpsTime t, const Eigen::Vector3d& predicted_w_m) {
+    if (!anchor_.valid() || !smoother.find(anchor_)) {
+      anchor_ = {};
+      if (!is_float_) return;
+      const auto anchor = smoother.add_variable(stationary::PositionAnchor{predicted_w_m}, t);
+      if (!anchor.ok()) return;
+      const double scale2 = options_.anchor_prior_scale * options_.anchor_prior_scale;
+      const auto prior = stationary::latch(*anchor, predicted_w_m, scale2 * position_covariance_m2_, options_.anchor_floor_m);
+      if (!prior.ok() || !smoother.add_factor(*prior).ok()) return void(smoother.remove_variable(*anchor));
+      anchor_ = *anchor;
+    }
+    (void)smoother.add_factor(stationary::PositionAnchorFactor{key, anchor_, options_.anchor_sigma_m});
   }
   template <class Smoother>
   void keep_on_wheels(Smoother& smoother, smoother::Key<State> key, GpsTime t) const {
@@ -224,7 +259,10 @@ class InertialMotion {
   imu::Preintegration<double, SampleCapacity> integration_{};
   stationary::Detector detector_;
   StaticVector<imu::ImuSample, 32> recent_{};
+  smoother::Key<stationary::PositionAnchor> anchor_{};  ///< of the present rest
+  Eigen::Matrix3d position_covariance_m2_{Eigen::Matrix3d::Identity()};
   double sigma_velocity_mps_{1};
+  bool is_float_{true}, rest_cue_{false};
 };
 
 }  // namespace searvins::estimator

@@ -12,6 +12,11 @@
 ///     resolve     LAMBDA on the joint marginal of that very float, gates                          (ambiguity/resolution.hpp)
 ///     fix         integer constraints on, optimise again; contradicted ones are taken back
 ///
+/// The covariance of a solution that rests on integers allows for their being wrong (law of total variance). They are right with a probability q, the
+/// success rate times the share of the offered ambiguities that agreed; else the float is what is known:
+///
+///     C = q C_fixed + (1 - q) C_float
+///
 /// A wrong fix cannot confirm itself: float and covariance that integers are judged by, and the prior that leaves the window, never contain an earlier
 /// integer. Integers held in the window only shape the solution that is output between fixes.
 ///
@@ -94,17 +99,31 @@ class RtkEstimator {
   /// A state without GNSS observations at a time after the last one, where the motion policy carries the window on. Errors: no_data (it does not, or
   /// there is no state yet), out_of_order, and those of the motion (IMU coverage); nothing was changed then.
   Result<RtkSolution> advance(GpsTime time) {
-    return advance_with(time, [](smoother::Key<State>, RtkSolution&) {});
+    return advance_with(time, SolutionSource::readings, [](smoother::Key<State>, RtkSolution&) { return ok_status(); });
   }
   /// The same with a position from elsewhere (a type that the motion policy takes) at its time. Loose coupling; the status is the fix's.
   template <class Fix>
   Result<RtkSolution> advance_to(const Fix& fix) {
-    return advance_with(fix.time, [&](smoother::Key<State> state, RtkSolution& out) {
+    return advance_with(fix.time, SolutionSource::position, [&](smoother::Key<State> state, RtkSolution& out) {
       const Status s = motion_.add_position(smoother_, state, fix, antenna_);
-      out.smoother_status = s;
       if (s.ok()) out.status = status_of_quality(fix.quality), out.satellites = std::max(0, fix.satellites);
+      return s;
     });
   }
+  /// A state at a stereo frame. A frame of about the newest state's time (options: shared_state_s) goes to that state, says so by no_data ("the frame
+  /// joined the newest state"), and counts from the next update on. Integers are not looked for. Errors besides: those of advance().
+  template <class Frame>
+  Result<RtkSolution> see(const Frame& frame) {
+    if (window_running() && std::abs(seconds_between(last_time_, frame.time)) <= options_.shared_state_s) {
+      const Status s = motion_.add_frame(smoother_, nodes_.back().state, last_time_, frame, stationary_);
+      return s.ok() ? failure(StatusCode::no_data, kJoined) : s;
+    }
+    if (!window_running() && frame.time <= last_time_) return failure(StatusCode::no_data, "the frame is from before the window");
+    return advance_with(frame.time, SolutionSource::camera, [&](smoother::Key<State> state, RtkSolution& out) {
+      return motion_.add_frame(smoother_, state, out.time, frame, out.stationary);
+    });
+  }
+  static constexpr const char* kJoined = "the frame joined the newest state";
 
   /// RTKLIB's quality numbers.
   [[nodiscard]] static SolutionStatus status_of_quality(int quality) {
@@ -116,7 +135,7 @@ class RtkEstimator {
     restart();
     frame_ = frame;
     motion_.set_frame(frame);
-    settle(state, covariance, time);
+    settle(state, covariance, time, true);
   }
   /// The antenna at the end of a motion that begins at the newest state; nothing is changed. Errors: no_data.
   template <class Integrated>
@@ -184,21 +203,23 @@ class RtkEstimator {
   [[nodiscard]] bool window_running() const { return !nodes_.empty(); }
 
   template <class AddMeasurement>
-  Result<RtkSolution> advance_with(GpsTime time, AddMeasurement add_measurement) {
+  Result<RtkSolution> advance_with(GpsTime time, SolutionSource source, AddMeasurement add_measurement) {
     if (!goes_on_without_gnss()) return failure(StatusCode::no_data, "nothing carries the window on without GNSS");
     if (time <= last_time_) return failure(StatusCode::out_of_order, "a state not after the last one");
     if (const auto x = motion_.predict(last_state_, last_time_, time); !x.ok()) return x.status();
     RtkSolution out;
     out.time = time, out.tag = time.plus_seconds(clock_offset_s_);
     out.clock_offset_s = clock_offset_s_;
+    out.source = source;
     single_point_ = {};
     predict(failure(StatusCode::no_data, "no rover epoch"), out);
     drop_differences(), epoch_.doppler.clear(), epoch_.doppler_pivot = -1;
-    continuation_.skip_epoch();
-    if (extend(out)) {
-      add_measurement(nodes_.back().state, out);
+    const bool is_frame = source == SolutionSource::camera;
+    if (!is_frame) continuation_.skip_epoch();
+    if (extend(out, !is_frame)) {
+      out.smoother_status = add_measurement(nodes_.back().state, out);
       const SolutionStatus measured = out.status;
-      estimate(out);
+      is_frame ? estimate_frame(out) : estimate(out);
       if (out.status == SolutionStatus::dr) out.status = nodes_.empty() ? SolutionStatus::dr : measured;
     } else {
       without_differences(failure(StatusCode::no_data, "no rover epoch"), out);
@@ -225,9 +246,9 @@ class RtkEstimator {
 
   [[nodiscard]] double since_last(const RtkSolution& out) const { return seconds_between(last_time_, out.time); }
   [[nodiscard]] bool goes_on_without_gnss() const { return Motion::is_inertial && has_state_; }
-  void settle(const State& state, const StateCovariance& covariance, GpsTime time) {
+  void settle(const State& state, const StateCovariance& covariance, GpsTime time, bool is_float) {
     last_state_ = state, last_covariance_ = covariance, last_time_ = time, has_state_ = true;
-    motion_.settle(state, covariance, time);
+    motion_.settle(state, covariance, time, is_float);
   }
 
   /// The window's prediction is worth starting from when it is not older than this.
@@ -294,10 +315,10 @@ class RtkEstimator {
   // ---- extend: state, factors, ambiguities -----------------------------------------------------------------------------------------------
 
   /// False when the state was refused (smoother_status says why): the window is as it was.
-  [[nodiscard]] bool extend(RtkSolution& out) {
+  [[nodiscard]] bool extend(RtkSolution& out, bool is_epoch = true) {
     out.satellites = epoch_.satellites;
     antenna_ = motion_.antenna_at(out.time);
-    continuation_.begin_epoch();
+    if (is_epoch) continuation_.begin_epoch();
     select_phases();
     const Eigen::Vector3d start_e_m = snapshot_position();
     if (!window_running()) {
@@ -320,11 +341,13 @@ class RtkEstimator {
       return false;
     }
     (void)nodes_.push_back({*state, out.time, antenna_, SolutionStatus::dr});
+    stationary_ = out.stationary;
     code_keys_.clear(), phase_keys_.clear(), differences_.clear();
     code_variance_factor_ = code_noise_.variance_factor(), phase_variance_factor_ = phase_noise_.variance_factor();
     code_information_share_ = 1 / correlation_factor(out);
     for (int g = 0; g < static_cast<int>(epoch_.groups.size()); ++g) add_group(g, *state, start_e_m, out);
     if (options_.use_doppler) add_doppler(*state, out);
+    if (!code_keys_.empty()) last_epoch_time_ = out.time, has_epoch_ = true;
     return true;
   }
 
@@ -341,7 +364,7 @@ class RtkEstimator {
   /// n epochs within the correlation time of code errors are worth one, so each counts for 1/n.
   [[nodiscard]] double correlation_factor(const RtkSolution& out) const {
     if (is_instantaneous()) return 1;
-    const double interval_s = nodes_.size() < 2 ? 1.0 : seconds_between(nodes_[nodes_.size() - 2].time, out.time);
+    const double interval_s = has_epoch_ ? seconds_between(last_epoch_time_, out.time) : 1.0;
     const double speed_mps = std::max(1e-3, predicted_v_e_mps_.norm());
     const double correlation_s = std::min(options_.code_correlation_s, options_.code_correlation_m / speed_mps);
     return std::max(1.0, correlation_s / std::max(0.05, interval_s));
@@ -618,7 +641,9 @@ class RtkEstimator {
     if (!optimise(out)) return recover(out);
     out.status = out.phases > 0 ? SolutionStatus::float_ : out.double_differences > 0 ? SolutionStatus::dgnss : SolutionStatus::dr;
     const bool have_float = collect_float(out);
+    if (!have_float) float_.Q_pp = held_.empty() ? Eigen::Matrix3d::Zero() : position_covariance();
     while (is_window_long(out)) marginalise_oldest();
+    if (nodes_.empty()) return recover(out);
     forget_gone_integers();
     release_contradicted(out);
     StaticVector<smoother::Key<gnss::IntegerFix>, kPhasesSize> fresh;
@@ -629,7 +654,10 @@ class RtkEstimator {
       if (!fresh.empty()) learn_phase_noise(out);
       if (!fresh.empty() && is_suspect()) take_back(fresh, out);
     }
-    if (out.verdict == ambiguity::ResolutionVerdict::accepted) out.status = SolutionStatus::fix;
+    if (out.verdict == ambiguity::ResolutionVerdict::accepted) {
+      out.status = SolutionStatus::fix;
+      integer_trust_ = out.success_rate * outcome_.count / std::max(1, outcome_.tried);
+    }
     write(out);
     if (options_.fix_memory == FixMemory::epoch) release_all();
     out.held_integers = static_cast<int>(held_.size());
@@ -639,8 +667,25 @@ class RtkEstimator {
   }
   static constexpr std::size_t kPhasesSize = static_cast<std::size_t>(kPhases);
 
-  bool optimise(RtkSolution& out) {
-    const auto report = smoother_.optimise(options_.solver);
+  /// A state without GNSS: what leaves the window leaves it without integers, as ever, and those that are held go on shaping the rest.
+  void estimate_frame(RtkSolution& out) {
+    out.status = SolutionStatus::dr;
+    if (is_window_long(out)) {
+      smoother_.template set_enabled<gnss::IntegerFix>(false);
+      while (is_window_long(out)) marginalise_oldest();
+      forget_gone_integers();
+    }
+    if (!held_.empty()) smoother_.template set_enabled<gnss::IntegerFix>(true);
+    if (nodes_.empty() || !optimise(out, options_.frame_iterations)) return recover(out);
+    write(out);
+    out.held_integers = static_cast<int>(held_.size());
+  }
+
+  bool optimise(RtkSolution& out) { return optimise(out, options_.solver.max_iterations); }
+  bool optimise(RtkSolution& out, int max_iterations) {
+    auto solver = options_.solver;
+    solver.max_iterations = max_iterations;
+    const auto report = smoother_.optimise(solver);
     out.iterations += report.iterations;
     out.smoother_status = report.status;
     return report.status.ok() || report.status.code == StatusCode::not_converged;
@@ -649,7 +694,7 @@ class RtkEstimator {
   /// The window could not be solved: it is dropped, the epoch answers from its own start.
   void recover(RtkSolution& out) {
     out.status = out.double_differences > 0 ? SolutionStatus::dgnss : SolutionStatus::dr;
-    set_antenna(*smoother_.find(nodes_.back().state), antenna_, out);
+    set_antenna(nodes_.empty() ? predicted_ : *smoother_.find(nodes_.back().state), antenna_, out);
     const double sigma_m = std::max(5.0, predicted_sigma_m_);
     out.covariance_enu_m2 = Eigen::Matrix3d::Identity() * sigma_m * sigma_m;
     out.velocity_covariance_enu = Eigen::Matrix3d::Identity();
@@ -663,11 +708,19 @@ class RtkEstimator {
   }
 
   void marginalise_oldest() {
+    motion_.before_marginalising(smoother_, nodes_.front().state);
     const auto report = smoother_.marginalise_oldest(options_.solver);
     if (report.status.ok())
       nodes_.erase(0);
     else
       restart();
+  }
+
+  /// Covariance of the antenna's position in w, from the window as it was last optimised.
+  [[nodiscard]] Eigen::Matrix3d position_covariance() {
+    const auto covariance = smoother_.covariance(nodes_.back().state);
+    const StateCovariance P = covariance.ok() ? *covariance : start_covariance();
+    return Motion::antenna_covariance(*smoother_.find(nodes_.back().state), P, antenna_).template topLeftCorner<3, 3>();
   }
 
   /// The float double differences of this epoch with their joint covariance with the position. False when there is nothing to resolve.
@@ -832,10 +885,19 @@ class RtkEstimator {
     const auto covariance = smoother_.covariance(nodes_.back().state);
     const StateCovariance P = covariance.ok() ? *covariance : start_covariance();
     describe(x, P, antenna_, out);
-    settle(x, P, nodes_.back().time);
+    if constexpr (Motion::has_camera) out.tracks = motion_.frame_report().admitted;
+    if (!held_.empty()) doubt_integers(out);
+    settle(x, P, nodes_.back().time, held_.empty());
     nodes_.back().status = out.status;
     out.code_weight = mean_weight(code_keys_);
     out.phase_weight = mean_weight(phase_keys_);
+  }
+
+  /// See the file comment. The float is that of this epoch, with the integers switched off; frames go on with the last epoch's.
+  void doubt_integers(RtkSolution& out) {
+    const Eigen::Matrix3d R = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(out.position_e_m)).transpose() * frame_.R_ew;
+    if (out.source != SolutionSource::camera) doubt_enu_m2_ = (1 - integer_trust_) * (R * float_.Q_pp * R.transpose() - out.covariance_enu_m2);
+    out.covariance_enu_m2 += doubt_enu_m2_;
   }
 
   template <class Keys>
@@ -863,7 +925,7 @@ class RtkEstimator {
     smoother_.clear();
     nodes_.clear(), held_.clear(), code_keys_.clear(), phase_keys_.clear(), differences_.clear();
     continuation_.clear();
-    suspect_epochs_ = 0;
+    suspect_epochs_ = 0, has_epoch_ = false;
     if (!Motion::is_inertial) has_state_ = false;
   }
 
@@ -900,6 +962,10 @@ class RtkEstimator {
   typename Motion::Antenna antenna_{};  ///< at the epoch at hand
   GpsTime last_time_{};
   bool is_predicted_{false}, has_state_{false};
+  double integer_trust_{1};  ///< probability that the integers accepted last are right
+  Eigen::Matrix3d doubt_enu_m2_{Eigen::Matrix3d::Zero()};  ///< what that adds to the covariance of the position
+  GpsTime last_epoch_time_{};  ///< of the last state with codes in this window
+  bool has_epoch_{false}, stationary_{false};
   double doubt_m_{0};  ///< sigma that the next window's start is widened by
   GpsTime last_tag_{};
   bool started_{false};

@@ -64,6 +64,8 @@ struct RtkOptions {
   int min_suspect_epochs{4};            ///< consecutive epochs whose codes mostly contradict the window, after which it is started anew
   double start_sigma_m{100}, start_velocity_sigma_mps{30}, start_acceleration_sigma_mps2{5};
   double max_gap_s{60};                 ///< a longer gap starts a new window
+  double shared_state_s{0.01};          ///< a frame this near to the newest state goes to it
+  int frame_iterations{2};              ///< of Gauss-Newton at a frame
   smoother::OptimiseOptions<double> solver{.max_iterations = 8, .step_tolerance = 1e-3, .relinearise_threshold = 0.1, .weight_threshold = 0.02};
 };
 

@@ -28,11 +28,20 @@ enum class SolutionStatus : std::uint8_t {
   return names[static_cast<std::size_t>(s)];
 }
 
+/// What made the estimator place a state.
+enum class SolutionSource : std::uint8_t {
+  rover,     ///< a rover epoch
+  position,  ///< a position from elsewhere
+  camera,    ///< a frame
+  readings   ///< silence of all others
+};
+
 /// The newest-state estimate at one rover epoch, causal.
 struct RtkSolution {
   GpsTime tag{};   ///< the receiver's own epoch tag
   GpsTime time{};  ///< GPS time of the state: tag minus the estimated receiver clock offset
   SolutionStatus status{SolutionStatus::dr};
+  SolutionSource source{SolutionSource::rover};
   Eigen::Vector3d position_e_m{Eigen::Vector3d::Zero()};           ///< antenna, ECEF
   Eigen::Vector3d velocity_e_mps{Eigen::Vector3d::Zero()};
   Eigen::Matrix3d covariance_enu_m2{Eigen::Matrix3d::Zero()};      ///< of the position, East-North-Up at the position
@@ -41,6 +50,7 @@ struct RtkSolution {
   int satellites{0};        ///< distinct satellites used
   int double_differences{0};  ///< code and phase
   int phases{0}, fixed_phases{0};
+  int tracks{0};              ///< observations of landmarks that the newest frame brought
   double base_age_s{std::numeric_limits<double>::quiet_NaN()};
   ambiguity::ResolutionVerdict verdict{ambiguity::ResolutionVerdict::too_few};
   double success_rate{0}, ratio{0};
