@@ -15,16 +15,19 @@ namespace {
 struct LaterOption {
   const char *name, *value_name;
 };
-constexpr LaterOption kLaterOptions[] = {{"tracks", "FILE"}, {"images", "DIR"}, {"positions", "FILE"}, {"dataset", "KIND"}};
+constexpr LaterOption kLaterOptions[] = {{"images", "DIR"}, {"dataset", "KIND"}};
 
 OptionParser solve_parser() {
   OptionParser parser{"searvins solve", "positions of a GNSS antenna, alone or with an inertial unit, from recordings"};
-  parser.value("rover", "FILE", "RINEX observation file of the moving receiver").required();
+  parser.value("rover", "FILE", "RINEX observation file of the moving receiver");
   parser.value("base", "FILE", "RINEX observation file of the base station; without it single points are computed");
-  parser.value("nav", "FILE", "RINEX navigation file").required().repeated();
+  parser.value("nav", "FILE", "RINEX navigation file").repeated();
   parser.value("out", "DIR", "folder for the results, made when it is missing").required();
   parser.value("rig", "FILE", "rig.json: signals, sigmas, base position, inertial unit, lever arm");
   parser.value("imu", "FILE", "log of the inertial unit that --rig describes: tightly coupled, a solution through outages");
+  parser.value("positions", "FILE", "another program's positions (.pos, or week,sow,x,y,z[,sd..]) instead of --rover, --base and --nav: loosely coupled");
+  parser.value("tracks", "FILE", "stereo tracks of a frontend, pixels of the rectified pair that --rig describes; with --imu");
+  parser.value("without", "LIST", "parts of the screening of tracks to switch off: semantic, geometric, motion, maturity");
   parser.value("heading", "DEG[,SIGMA]", "heading at the start, clockwise from north, and its sigma; else found from the motion");
   parser.value("base-ecef", "X,Y,Z", "antenna of the base, ECEF metres; else the rig's, else that of the base file's header");
   parser.value("robust", "FORM", "robust formulation").fallback(kDefaultFormulation).one_of({"batch", "scalar", "latent", "symmetric"});
@@ -45,8 +48,8 @@ OptionParser solve_parser() {
   parser.value("end", "SOW", "last second of week to solve");
   parser.value("truth", "FILE", "reference trajectory: errors are computed and shown");
   parser.value("truth-ecef", "X,Y,Z", "reference point of an antenna that does not move, ECEF metres");
-  parser.value("rate", "WHAT", "rows to write: one a rover epoch, or also one an IMU reading").fallback("gnss");
-  for (const LaterOption& later : kLaterOptions) parser.value(later.name, later.value_name, "not in this version, which solves GNSS and IMU");
+  parser.value("rate", "WHAT", "rows to write: gnss (one a rover epoch), camera (also one a frame) or imu (also one a reading)").fallback("gnss");
+  for (const LaterOption& later : kLaterOptions) parser.value(later.name, later.value_name, "not in this version, which takes tracks, not pictures");
   parser.epilogue(
       "Written: trajectory.csv, trajectory_lagged.csv, solution.pos (RTKPLOT), trajectory.kml, trajectory_tum.txt (evo), summary.json, "
       "report.html.\nExit codes: 0 done, 2 usage, 3 unusable input, 4 the run ended without a solution.");
@@ -71,18 +74,21 @@ void take_signals(Options& options, SolveRequest& request) {
 void refuse_later_options(Options& options) {
   for (const LaterOption& later : kLaterOptions)
     if (options.given(later.name))
-      options.fail(std::string{"--"} + later.name + ": this version solves GNSS and IMU only; leave the option out");
+      options.fail(std::string{"--"} + later.name + ": this version takes stereo tracks (--tracks), not pictures or other layouts; leave the option out");
   const std::string rate = options.text("rate");
-  if (rate == "camera")
-    options.fail("--rate camera: this version has no cameras; use gnss or imu");
-  else if (rate != "gnss" && rate != "imu")
-    options.fail("--rate: '" + rate + "' is none of gnss, imu");
+  if (rate == "camera" && !options.given("tracks")) options.fail("--rate camera needs --tracks FILE");
+  if (rate != "gnss" && rate != "camera" && rate != "imu") options.fail("--rate: '" + rate + "' is none of gnss, camera, imu");
 }
 
 /// Options of the inertial unit, and what each of them needs.
 void take_imu(Options& options, SolveRequest& request) {
   request.imu = options.text("imu");
-  request.at_imu_rate = options.text("rate") == "imu";
+  request.at_imu_rate = options.text("rate") == "imu", request.at_camera_rate = options.text("rate") == "camera";
+  request.tracks = options.text("tracks"), request.without = options.list("without");
+  for (const std::string& part : request.without)
+    if (part != "semantic" && part != "geometric" && part != "motion" && part != "maturity")
+      options.fail("--without: '" + part + "' is none of semantic, geometric, motion, maturity");
+  if (!request.without.empty() && request.tracks.empty()) options.fail("--without needs --tracks FILE");
   if (options.given("heading")) {
     const std::vector<double> heading = options.numbers("heading", options.list("heading").size() == 2 ? 2 : 1);
     if (!heading.empty()) request.heading_deg = heading[0];
@@ -91,18 +97,33 @@ void take_imu(Options& options, SolveRequest& request) {
       options.fail("--heading: the sigma must lie in 0 .. 90 degrees");
   }
   if (request.imu.empty()) {
-    for (const char* name : {"heading", "rate"})
+    for (const char* name : {"heading", "rate", "tracks"})
       if (options.given(name) && options.text(name) != "gnss")
         options.fail(std::string{"--"} + name + ' ' + options.text(name) + " needs --imu FILE");
     return;
   }
   if (request.rig.empty()) options.fail("--imu needs --rig FILE: the axes and noise of the unit, and where the antenna is");
-  if (request.base.empty()) options.fail("--imu needs --base FILE: the tightly coupled estimator works with differences");
+  if (request.base.empty() && request.positions.empty())
+    options.fail("--imu needs --base FILE: the tightly coupled estimator works with differences; or --positions FILE, loosely coupled");
+}
+
+/// Where the measurements come from: a rover with its ephemerides, or positions of another program.
+void take_sources(Options& options, SolveRequest& request) {
+  request.rover = options.text("rover"), request.base = options.text("base"), request.nav = options.texts("nav");
+  request.positions = options.text("positions");
+  if (request.positions.empty()) {
+    if (request.rover.empty()) options.fail("--rover FILE is missing (or --positions FILE with --imu)");
+    if (request.nav.empty()) options.fail("--nav FILE is missing");
+    return;
+  }
+  for (const char* name : {"rover", "base", "nav", "base-ecef", "signals"})
+    if (options.given(name)) options.fail(std::string{"--positions is given: leave --"} + name + " out");
+  if (!options.given("imu")) options.fail("--positions needs --imu FILE: without readings there is nothing to couple the positions to");
 }
 
 SolveRequest request_of(Options& options) {
   SolveRequest request;
-  request.rover = options.text("rover"), request.base = options.text("base"), request.nav = options.texts("nav");
+  take_sources(options, request);
   request.rig = options.text("rig"), request.truth = options.text("truth");
   request.truth_point_e_m = point(options, "truth-ecef"), request.base_position_e_m = point(options, "base-ecef");
   request.start_sow = options.optional_number("start", 0, 604800), request.end_sow = options.optional_number("end", 0, 604800);

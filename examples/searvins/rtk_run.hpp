@@ -11,6 +11,7 @@
 
 #include <searvins/estimator/estimator.hpp>
 #include <searvins/estimator/rtk_estimator.hpp>
+#include <searvins/estimator/stereo_inertial_motion.hpp>
 
 #include "examples/searvins/solver_run.hpp"
 
@@ -49,7 +50,7 @@ class RtkRun final : public EpochRun {
   estimator::RtkEstimator<estimator::RtkConfig<Form>> estimator_;
 };
 
-/// The tightly coupled Estimator behind the interface. About a hundred megabytes: lives on the heap.
+/// The tightly coupled Estimator behind the interface, with a camera where frames come. Some hundred megabytes: lives on the heap.
 template <template <class> class Form>
 class InertialRun final : public SolverRun {
  public:
@@ -65,6 +66,8 @@ class InertialRun final : public SolverRun {
     if (s.ok()) newest_ = sample.time;
     return s;
   }
+  Status add_position(const imu::PositionFix& fix) override { return estimator_.add_position(fix); }
+  Status add_stereo(const TrackFrame& frame) override { return estimator_.add_stereo(frame); }
   Status set_heading(double heading_rad, double sigma_rad) override { return estimator_.set_heading(heading_rad, sigma_rad); }
   void finish() override { estimator_.finish(); }
 
@@ -79,15 +82,21 @@ class InertialRun final : public SolverRun {
   [[nodiscard]] std::optional<AlignmentReport> alignment() const override {
     return AlignmentReport{estimator_.is_aligned(), estimator_.alignments(), estimator_.waiting_text()};
   }
+  [[nodiscard]] std::optional<StereoReport> stereo() const override {
+    const auto& motion = estimator_.inertial().motion();
+    return StereoReport{motion.counts(), motion.dropped_landmarks(), estimator_.refused_frames(), estimator_.frame_status().what};
+  }
 
  private:
-  [[nodiscard]] static estimator::EstimatorOptions whole(const RunOptions& options) {
-    estimator::EstimatorOptions o;
+  using Whole = estimator::Estimator<Form, estimator::StereoCapacity, estimator::StereoInertialMotion<>>;
+
+  [[nodiscard]] static typename Whole::Options whole(const RunOptions& options) {
+    typename Whole::Options o;
     o.rtk = options.rtk, o.inertial = *options.inertial;
     return o;
   }
 
-  estimator::Estimator<Form> estimator_;
+  Whole estimator_;
   GpsTime newest_{};  ///< time of the newest reading
 };
 

@@ -13,6 +13,7 @@
 #include <searvins/gnss/weighting.hpp>
 #include <searvins/io/imu_check.hpp>
 #include <searvins/io/imu_log.hpp>
+#include <searvins/io/pos_file.hpp>
 #include <searvins/io/rinex_navigation.hpp>
 #include <searvins/io/rinex_observation.hpp>
 #include <searvins/io/text_fields.hpp>
@@ -75,9 +76,8 @@ Failure check_same_file(const SolveRequest& request) {
                         "give the file of the base station with --base, or leave --base out"};
 }
 
-/// The part of the recording that is asked for, and whether rover and base share any of it.
-Failure take_times(const SolveRequest& request, SolveInputs& in) {
-  const GpsTime first = *in.rover.summary.first, last = *in.rover.summary.last;
+/// The part of a recording from `first` to `last` that is asked for.
+Failure take_span(const SolveRequest& request, const std::string& file, GpsTime first, GpsTime last, SolveInputs& in) {
   const auto place = [first](double sow) {  // in the week that is nearest to the recording's beginning
     const double apart_s = sow - first.sow();
     const int week = apart_s < -kSecondsPerWeek / 2 ? 1 : apart_s > kSecondsPerWeek / 2 ? -1 : 0;
@@ -86,10 +86,16 @@ Failure take_times(const SolveRequest& request, SolveInputs& in) {
   in.start = request.start_sow ? place(*request.start_sow).plus_seconds(-0.02) : first;
   in.end = request.end_sow ? place(*request.end_sow).plus_seconds(0.02) : last;
   if (in.start > last || in.end < first)
-    return io::Diagnostic{request.rover, 0,
+    return io::Diagnostic{file, 0,
                           "has no epoch between --start and --end: it goes from " + time_text(first) + " to " + time_text(last),
                           "--start and --end are GPS seconds of week"};
   in.start = std::max(in.start, first), in.end = std::min(in.end, last);
+  return {};
+}
+
+/// The part of the recording that is asked for, and whether rover and base share any of it.
+Failure take_times(const SolveRequest& request, SolveInputs& in) {
+  if (Failure f = take_span(request, request.rover, *in.rover.summary.first, *in.rover.summary.last, in)) return f;
   if (!in.base) return {};
   const GpsTime base_first = *in.base->summary.first, base_last = *in.base->summary.last;
   const double max_age_s = in.options.differencing.base.max_age_s;
@@ -237,7 +243,7 @@ Failure take_unit(const SolveRequest& request, const Rig& rig, SolveInputs& in) 
     return io::Diagnostic{request.rig, 0, "has no antenna.lever_arm_b_m, which --imu needs: from the inertial unit to the antenna, metres, body "
                           "axes",
                           "add \"antenna\": {\"lever_arm_b_m\": [x, y, z]}; [0, 0, 0] where they sit together"};
-  estimator::InertialOptions& inertial = in.inertial.emplace();
+  estimator::StereoInertialOptions& inertial = in.inertial.emplace();
   imu::ImuNoise& n = inertial.preintegration.noise;
   n.accel_noise_mps2_sqrt_hz = rig.imu->accel_noise_mps2_sqrt_hz, n.gyro_noise_radps_sqrt_hz = rig.imu->gyro_noise_radps_sqrt_hz;
   n.accel_bias_walk_mps3_sqrt_hz = rig.imu->accel_bias_walk_mps3_sqrt_hz;
@@ -246,6 +252,34 @@ Failure take_unit(const SolveRequest& request, const Rig& rig, SolveInputs& in) 
   const bool is_mean = rig.imu->sample == RigImu::Sample::mean_to_stamp;
   inertial.preintegration.kind = is_mean ? imu::SampleKind::mean_to_stamp : imu::SampleKind::instantaneous;
   inertial.lever_arm_b_m = rig.R_rfu_b * *rig.lever_arm_b_m;
+  return {};
+}
+
+/// The camera of the rig, and how its tracks are screened.
+Failure take_camera(const SolveRequest& request, const Rig& rig, SolveInputs& in) {
+  if (request.tracks.empty()) return {};
+  if (!rig.camera || !rig.camera->rectified)
+    return io::Diagnostic{request.rig, 0, "has no section camera.rectified, which --tracks needs: tracks are pixels of the rectified pair",
+                          "add it (fx_px, fy_px, cx_px, cy_px, baseline_m), with size_px, R_b_c, t_b_c_m and sigma_px beside it"};
+  estimator::StereoOptions& stereo = in.inertial->stereo;
+  vision::StereoCamera<double>& c = stereo.camera;
+  const RigRectified& r = *rig.camera->rectified;
+  c.fx_px = r.fx_px, c.fy_px = r.fy_px, c.cx_px = r.cx_px, c.cy_px = r.cy_px, c.baseline_m = r.baseline_m;
+  c.width_px = static_cast<int>(rig.camera->size_px.x()), c.height_px = static_cast<int>(rig.camera->size_px.y());
+  c.R_bc = rig.R_rfu_b * rig.camera->R_b_c, c.p_bc_m = rig.R_rfu_b * rig.camera->t_b_c_m;
+  if (const Status s = vision::check(c); !s.ok()) return io::Diagnostic{request.rig, 0, s.what, "see section camera"};
+  vision::AdmissionOptions& a = stereo.admission;
+  a.pnp.sigma_px = rig.camera->sigma_px;
+  if (rig.reject_classes) {
+    a.semantic.dynamic = a.semantic.unstable = vision::ClassSet{};
+    for (const int k : *rig.reject_classes) a.semantic.dynamic.insert(static_cast<vision::SemanticClass>(k));
+  }
+  for (const std::string& part : request.without) {
+    if (part == "semantic") a.use_semantic = false;
+    if (part == "geometric") a.use_geometric = false;
+    if (part == "motion") a.use_motion = false;
+    if (part == "maturity") a.use_maturity = false;
+  }
   return {};
 }
 
@@ -282,7 +316,7 @@ Failure take_readings(const SolveRequest& request, const Rig& rig, SolveInputs& 
   if (first > in.end || last < in.start)
     return io::Diagnostic{request.imu, 0,
                           "does not overlap the rover in time: readings from " + time_text(first) + " to " + time_text(last) +
-                              ", rover from " + time_text(in.start) + " to " + time_text(in.end),
+                              ", to solve from " + time_text(in.start) + " to " + time_text(in.end),
                           "give the log of the rover's drive; its stamps must be GPS time"};
   if (first > in.start.plus_seconds(1) || last.plus_seconds(1) < in.end)
     in.notes.push_back(name + ": the readings cover only a part of the rover's time, from " + time_text(first) + " to " + time_text(last));
@@ -296,6 +330,25 @@ Failure take_readings(const SolveRequest& request, const Rig& rig, SolveInputs& 
   const GpsTime from = in.start.plus_seconds(-1), to = in.end.plus_seconds(0.1);  // further, nothing asks for a solution
   std::copy_if(samples.begin(), samples.end(), std::back_inserter(in.imu),
                [&](const imu::ImuSample& s) { return s.time >= from && s.time <= to; });
+  return {};
+}
+
+/// Positions of another program in the place of rover and base.
+Failure take_positions(const SolveRequest& request, SolveInputs& in) {
+  io::Parsed<std::vector<imu::PositionFix>> file = io::read_pos_file(request.positions);
+  if (file.error) return *file.error;
+  note_skipped(request.positions, file.skipped, in.notes);
+  const std::vector<imu::PositionFix>& all = file.value;
+  if (Failure f = take_span(request, request.positions, all.front().time, all.back().time, in)) return f;
+  std::vector<double> steps_s;
+  for (std::size_t k = 1; k < all.size(); ++k) steps_s.push_back(seconds_between(all[k - 1].time, all[k].time));
+  if (!steps_s.empty()) {
+    const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
+    std::nth_element(steps_s.begin(), middle, steps_s.end());
+    in.interval_s = *middle;
+  }
+  std::copy_if(all.begin(), all.end(), std::back_inserter(in.positions),
+               [&](const imu::PositionFix& p) { return p.time >= in.start && p.time <= in.end; });
   return {};
 }
 
@@ -316,10 +369,18 @@ io::FileResult<SolveInputs> prepare(const SolveRequest& request) {
     if (!read) return read.error();
     rig = std::move(read).value();
   }
+  if (!request.positions.empty()) {
+    if (const Failure f = take_positions(request, in)) return *f;
+    if (const Failure f = take_truth(request, in)) return *f;
+    if (const Failure f = take_unit(request, rig, in)) return *f;
+    if (const Failure f = take_readings(request, rig, in)) return *f;
+    if (const Failure f = take_camera(request, rig, in)) return *f;
+    return in;
+  }
   if (const Failure f = check_same_file(request)) return *f;
   io::FileResult<io::ObservationFileInfo> rover = scan(request.rover, in.notes);
   if (!rover) return rover.error();
-  in.rover = std::move(rover).value();
+  in.rover = std::move(rover).value(), in.interval_s = in.rover.interval_s;
   if (!request.base.empty()) {
     io::FileResult<io::ObservationFileInfo> base = scan(request.base, in.notes);
     if (!base) return base.error();
@@ -335,6 +396,7 @@ io::FileResult<SolveInputs> prepare(const SolveRequest& request) {
   if (request.imu.empty()) return in;
   if (const Failure f = take_unit(request, rig, in)) return *f;
   if (const Failure f = take_readings(request, rig, in)) return *f;
+  if (const Failure f = take_camera(request, rig, in)) return *f;
   return in;
 }
 

@@ -15,6 +15,7 @@
 #include <searvins/io/rinex_observation.hpp>
 #include <searvins/io/text_fields.hpp>
 
+#include "examples/precomputed_frontend/track_reader.hpp"
 #include "examples/searvins/solve_job.hpp"
 #include "examples/support/progress.hpp"
 
@@ -47,6 +48,7 @@ io::TrajectoryRow row_of(const estimator::RtkSolution& s, double solve_ms) {
   row.set_covariance_enu_m2(s.covariance_enu_m2);
   row.v_enu_mps = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(s.position_e_m)).transpose() * s.velocity_e_mps;
   row.n_sat = s.satellites, row.n_dd = s.double_differences;
+  if (s.has_attitude) row.n_tracks = s.tracks;
   if (was_searched(s.verdict)) row.success_rate = s.success_rate;
   row.solve_ms = solve_ms;
   if (s.has_attitude) {
@@ -233,7 +235,7 @@ class AlignmentWatch {
 /// Stretches without GNSS: two or more rows of dead reckoning, or a time without rows.
 std::vector<Outage> outages_of(const SolveInputs& in, const std::vector<io::TrajectoryRow>& rows) {
   std::vector<Outage> outages;
-  const double step_s = in.rover.interval_s > 0 ? in.rover.interval_s : 1;
+  const double step_s = in.interval_s > 0 ? in.interval_s : 1;
   std::size_t last = 0;  // the last row with GNSS
   const auto has_gnss = [&rows](std::size_t i) { return rows[i].status != io::SolutionStatus::dr; };
   for (std::size_t i = 1; i < rows.size(); ++i) {
@@ -260,7 +262,7 @@ std::vector<Outage> outages_of(const SolveInputs& in, const std::vector<io::Traj
 void score(const SolveRequest& request, const SolveInputs& in, SolveOutcome& out) {
   if (!in.truth || out.rows.empty()) return;
   EvaluationOptions rules;
-  rules.step_s = std::max(1.0, std::round(in.rover.interval_s));
+  rules.step_s = std::max(1.0, std::round(in.interval_s));
   const GpsTime reference = in.truth->is_static ? out.rows.front().time : in.truth->points.front().time;
   const GpsTime week_start = GpsTime::from_week_sow(reference.week(), 0);
   rules.start_sow = seconds_between(week_start, in.start) - (in.truth->is_static ? 0 : 0.02);
@@ -275,14 +277,23 @@ void score(const SolveRequest& request, const SolveInputs& in, SolveOutcome& out
 /// Takes the solutions that are due, and knows which rover epochs are still without one.
 class Drain {
  public:
-  Drain(const SolveInputs& in, SolverRun& run, SolveOutcome& out)
-      : in_(in), run_(run), out_(out), collector_(out, in.base.has_value()), watch_(in.start, out) {}
+  Drain(const SolveInputs& in, bool at_camera_rate, SolverRun& run, SolveOutcome& out)
+      : in_(in), run_(run), out_(out), collector_(out, in.base.has_value()), watch_(in.start, out), at_camera_rate_(at_camera_rate) {}
 
   void add_rover(const gnss::ObservationEpoch& epoch) {
     ++out_.rover_epochs;
     const Status s = run_.add_rover(epoch);
     if (s.ok())
       waiting_.push_back({epoch.tag, static_cast<int>(epoch.satellites.size())});
+    else
+      add_count(out_.skipped, s.what);
+  }
+
+  void add_position(const imu::PositionFix& fix) {
+    ++out_.rover_epochs;
+    const Status s = run_.add_position(fix);
+    if (s.ok())
+      waiting_.push_back({fix.time, std::max(0, fix.satellites)});
     else
       add_count(out_.skipped, s.what);
   }
@@ -332,6 +343,7 @@ class Drain {
       if (waiting_.front().tag == s.tag) satellites_seen = waiting_.front().satellites;
       waiting_.pop_front();
     }
+    if (s.source == estimator::SolutionSource::camera && !is_row_of_frame(s)) return;
     if (!s.position_e_m.allFinite() || (!out_.rows.empty() && s.time <= out_.rows.back().time)) {
       add_count(out_.skipped, s.position_e_m.allFinite() ? "time of the state does not rise" : "position is not finite");
       return;
@@ -341,7 +353,14 @@ class Drain {
     out_.answered_epochs += satellites_seen >= 0;
     fixed_ += s.status == estimator::SolutionStatus::fix;
     if (s.status != estimator::SolutionStatus::dr || s.has_attitude)
-      out_.solved_at_end = seconds_between(s.tag, in_.end) <= std::max(kEndS, 3 * in_.rover.interval_s);
+      out_.solved_at_end = seconds_between(s.tag, in_.end) <= std::max(kEndS, 3 * in_.interval_s);
+  }
+
+  /// Frames are rows at their own rate, or where nothing else has been for a second.
+  [[nodiscard]] bool is_row_of_frame(const estimator::RtkSolution& s) const {
+    constexpr double kSilenceS = 0.999;
+    const double since_s = out_.rows.empty() ? 0 : seconds_between(out_.rows.back().time, s.time);
+    return at_camera_rate_ ? since_s > 5e-4 : since_s > kSilenceS;
   }
 
   const SolveInputs& in_;
@@ -350,6 +369,7 @@ class Drain {
   Collector collector_;
   AlignmentWatch watch_;
   std::deque<Waiting> waiting_;
+  bool at_camera_rate_;
   long fixed_{0};
 };
 
@@ -365,27 +385,100 @@ void drop_predictions_at_solutions(SolveOutcome& out) {
   out.predicted_rows.erase(std::remove_if(out.predicted_rows.begin(), out.predicted_rows.end(), is_at_solution), out.predicted_rows.end());
 }
 
-/// Base, rover and readings in the order of time; solutions as they become due.
-void feed(const SolveRequest& request, const SolveInputs& in, io::RinexObservationReader& rover, BaseFeed& base, SolverRun& run,
-          SolveOutcome& out) {
-  Drain drain{in, run, out};
+/// Rover epochs with the base's, or another program's positions, one after the other.
+class MeasurementFeed {
+ public:
+  MeasurementFeed(const SolveInputs& in, SolverRun& run, SolveOutcome& out) : in_(in), run_(run), out_(out) {}
+
+  /// Opens the files and reads the first epoch of the time to solve.
+  io::FileResult<bool> open(const SolveRequest& request) {
+    if (!in_.positions.empty()) return true;
+    if (!rover_.open(request.rover)) return *rover_.error();
+    if (const io::FileResult<bool> opened = base_.open(request.base); !opened) return opened.error();
+    read_epoch();
+    return true;
+  }
+  [[nodiscard]] bool has_more() const { return in_.positions.empty() ? has_epoch_ : position_ < in_.positions.size(); }
+  [[nodiscard]] GpsTime time() const { return in_.positions.empty() ? epoch_.tag : in_.positions[position_].time; }
+  /// Hands the next one over.
+  void hand_over(Drain& drain) {
+    if (!in_.positions.empty()) return drain.add_position(in_.positions[position_++]);
+    base_.feed(epoch_.tag, run_, out_);
+    drain.add_rover(epoch_);
+    read_epoch();
+  }
+
+ private:
+  void read_epoch() {
+    do has_epoch_ = rover_.next(epoch_);
+    while (has_epoch_ && epoch_.tag < in_.start);
+    has_epoch_ = has_epoch_ && epoch_.tag <= in_.end;
+  }
+
+  const SolveInputs& in_;
+  SolverRun& run_;
+  SolveOutcome& out_;
+  io::RinexObservationReader rover_;
+  BaseFeed base_;
+  gnss::ObservationEpoch epoch_{};
+  std::size_t position_{0};
+  bool has_epoch_{false};
+};
+
+/// Frames of stereo tracks, one after the other.
+class TrackFeed {
+ public:
+  /// Opens the file, if there is one, and reads the first frame of the time to solve.
+  io::FileResult<bool> open(const std::string& path, const SolveInputs& in) {
+    if (path.empty()) return true;
+    if (auto wrong = reader_.open(path, in.start.week())) return *wrong;
+    const io::FileResult<bool> read = advance();
+    if (!read) return read.error();
+    while (has_frame_ && frame_->time < in.start)
+      if (const io::FileResult<bool> more = advance(); !more) return more.error();
+    if (!has_frame_) return io::Diagnostic{path, 0, "has no frame in the time to solve", "stamps are GPS seconds of week of the rover's week"};
+    return true;
+  }
+  /// Hands over the frames up to a time. Errors: a row that cannot be read.
+  io::FileResult<bool> feed(GpsTime until, SolverRun& run, SolveOutcome& out) {
+    while (has_frame_ && frame_->time <= until) {
+      ++out.frames;
+      if (const Status s = run.add_stereo(*frame_); !s.ok()) add_count(out.incidents, std::string{"frame: "} + s.what);
+      if (const io::FileResult<bool> more = advance(); !more) return more.error();
+    }
+    return true;
+  }
+  /// What was left out of the file.
+  void note_skipped(SolveOutcome& out) const {
+    for (const io::SkippedItem& item : reader_.skipped().items()) add_count(out.incidents, "tracks: " + item.reason, static_cast<long>(item.count));
+  }
+
+ private:
+  io::FileResult<bool> advance() {
+    const io::FileResult<bool> read = reader_.next(*frame_);
+    has_frame_ = read && *read;
+    return read;
+  }
+
+  precomputed::TrackReader reader_;
+  std::unique_ptr<TrackFrame> frame_{std::make_unique<TrackFrame>()};
+  bool has_frame_{false};
+};
+
+/// Measurements, frames and readings in the order of time; solutions as they become due. Errors: those of the tracks.
+io::FileResult<bool> feed(const SolveRequest& request, const SolveInputs& in, MeasurementFeed& measurements, TrackFeed& tracks, SolverRun& run,
+                          SolveOutcome& out) {
+  Drain drain{in, request.at_camera_rate, run, out};
   Progress progress{request.label, static_cast<std::size_t>(std::max(0.0, seconds_between(in.start, in.end) * 10)) + 1};
-  gnss::ObservationEpoch epoch;
-  const auto next_epoch = [&] {
-    bool more = rover.next(epoch);
-    while (more && epoch.tag < in.start) more = rover.next(epoch);
-    return more && epoch.tag <= in.end;
-  };
-  bool has_epoch = next_epoch();
   std::size_t k = 0;
-  while (has_epoch || k < in.imu.size()) {
-    if (has_epoch && (k == in.imu.size() || epoch.tag <= in.imu[k].time)) {
-      base.feed(epoch.tag, run, out);
-      drain.add_rover(epoch);
+  while (measurements.has_more() || k < in.imu.size()) {
+    if (measurements.has_more() && (k == in.imu.size() || measurements.time() <= in.imu[k].time)) {
+      const GpsTime time = measurements.time();
+      measurements.hand_over(drain);
       drain.take_due();
-      progress.update(static_cast<std::size_t>(seconds_between(in.start, epoch.tag) * 10) + 1, drain.progress_note());
-      has_epoch = next_epoch();
+      progress.update(static_cast<std::size_t>(seconds_between(in.start, time) * 10) + 1, drain.progress_note());
     } else {
+      if (const io::FileResult<bool> fed = tracks.feed(in.imu[k].time, run, out); !fed) return fed.error();
       if (const Status s = run.add_imu(in.imu[k++]); !s.ok()) add_count(out.incidents, std::string{"reading: "} + s.what);
       drain.take_due();
       if (request.at_imu_rate) drain.take_predicted();
@@ -396,6 +489,8 @@ void feed(const SolveRequest& request, const SolveInputs& in, io::RinexObservati
   drain.finish();
   progress.finish();
   drop_predictions_at_solutions(out);
+  tracks.note_skipped(out);
+  return true;
 }
 
 }  // namespace
@@ -403,7 +498,7 @@ void feed(const SolveRequest& request, const SolveInputs& in, io::RinexObservati
 io::FileResult<SolveOutcome> solve(const SolveRequest& request, const SolveInputs& in) {
   SolveOutcome out;
   const std::unique_ptr<SolverRun> run =
-      in.base ? make_run(request.formulation, {in.options, in.inertial}) : make_single_point_run(in.options);
+      in.base || in.inertial ? make_run(request.formulation, {in.options, in.inertial}) : make_single_point_run(in.options);
   if (!run)
     return io::Diagnostic{"--robust", 0, "'" + request.formulation + "' is no formulation", "use batch, scalar, latent or symmetric"};
   for (const gnss::Ephemeris& e : in.ephemerides)
@@ -417,12 +512,13 @@ io::FileResult<SolveOutcome> solve(const SolveRequest& request, const SolveInput
         !s.ok() && s.code != StatusCode::under_determined)  // kept until the unit is levelled
       return io::Diagnostic{"--heading", 0, s.what, "give DEG or DEG,SIGMA"};
 
-  io::RinexObservationReader rover;
-  BaseFeed base;
-  if (!rover.open(request.rover)) return *rover.error();
-  if (const io::FileResult<bool> opened = base.open(request.base); !opened) return opened.error();
+  MeasurementFeed measurements{in, *run, out};
+  if (const io::FileResult<bool> opened = measurements.open(request); !opened) return opened.error();
   const auto start = std::chrono::steady_clock::now();
-  feed(request, in, rover, base, *run, out);
+  TrackFeed tracks;
+  if (const io::FileResult<bool> opened = tracks.open(request.tracks, in); !opened) return opened.error();
+  if (const io::FileResult<bool> fed = feed(request, in, measurements, tracks, *run, out); !fed) return fed.error();
+  if (!request.tracks.empty()) out.stereo = run->stereo();
   out.wall_s = milliseconds_since(start) / 1000;
   score(request, in, out);
   out.outages = outages_of(in, out.rows);

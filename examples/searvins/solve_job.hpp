@@ -14,6 +14,7 @@
 #include <searvins/estimator/rtk_options.hpp>
 #include <searvins/gnss/ephemeris.hpp>
 #include <searvins/imu/imu_sample.hpp>
+#include <searvins/imu/position_fix.hpp>
 #include <searvins/io/file_result.hpp>
 #include <searvins/io/rinex_info.hpp>
 #include <searvins/io/trajectory.hpp>
@@ -39,9 +40,13 @@ struct SolveRequest {
   std::string formulation{kDefaultFormulation};
   std::string sigma_profile{kDefaultSigmaProfile};
   std::string imu{};                       ///< log of an inertial unit; empty: GNSS only
+  std::string positions{};                 ///< another program's positions, instead of rover, base and nav: loosely coupled
+  std::string tracks{};                    ///< stereo tracks of a frontend, with an inertial unit
+  std::vector<std::string> without{};      ///< parts of the screening of tracks that are switched off
   std::optional<double> heading_deg{};     ///< at the beginning, from elsewhere
   double heading_sigma_deg{5};
   bool at_imu_rate{false};                 ///< rows between the solutions, one a reading
+  bool at_camera_rate{false};              ///< rows of the frames
   std::vector<gnss::SignalCode> signals{};  ///< empty: the rig's, else the best of every common carrier
   std::optional<double> mask_deg, min_cn0_dbhz;
   estimator::RtkOptions options{};  ///< what neither rig nor profile sets
@@ -51,16 +56,18 @@ struct SolveRequest {
 
 /// The files, read and checked against each other.
 struct SolveInputs {
+  std::vector<imu::PositionFix> positions;   ///< of the time to solve; then there is neither rover nor base
+  double interval_s{0};                      ///< between rover epochs, or positions
   io::ObservationFileInfo rover;
   std::optional<io::ObservationFileInfo> base;
   std::vector<gnss::Ephemeris> ephemerides;  ///< those of the rover's time
   gnss::KlobucharCoefficients ionosphere{};
-  GpsTime start{}, end{};  ///< rover tags to solve, inclusive
+  GpsTime start{}, end{};  ///< rover tags (or times of positions) to solve, inclusive
   Eigen::Vector3d base_position_e_m{Eigen::Vector3d::Zero()};
   std::string base_position_source{};
   std::optional<TruthTrack> truth;
   estimator::RtkOptions options{};
-  std::optional<estimator::InertialOptions> inertial{};
+  std::optional<estimator::StereoInertialOptions> inertial{};
   std::vector<imu::ImuSample> imu{};  ///< readings of the time to solve, in body axes
   double imu_interval_s{0};
   std::vector<std::string> notes;  ///< what a user should know
@@ -86,11 +93,13 @@ struct SolveOutcome {
   std::vector<ReportSatellite> satellites;
   std::vector<std::string> rejection_reasons, fix_outcomes;
   std::vector<double> ratios, ages_s;  ///< as many as rows
-  long rover_epochs{0};                ///< offered, between start and end
+  long rover_epochs{0};                ///< offered, between start and end; or positions
   long answered_epochs{0};             ///< with a solution
   std::vector<AlignmentEvent> alignment;
   std::vector<Count> alignment_waits;  ///< rows that were not aligned, by what was waited for
   std::vector<Outage> outages;
+  std::optional<StereoReport> stereo;   ///< when there were frames
+  long frames{0};                      ///< offered
   std::vector<Count> skipped;          ///< rover epochs without a solution, by reason
   std::vector<Count> incidents;        ///< epochs with a solution that something happened to
   long restarts{0}, released_integers{0};

@@ -83,8 +83,11 @@ std::size_t status_count(const SolveOutcome& outcome, io::SolutionStatus status)
       std::count_if(outcome.rows.begin(), outcome.rows.end(), [status](const io::TrajectoryRow& r) { return r.status == status; }));
 }
 
+/// The file that the epochs come from.
+const std::string& measurement_file(const SolveRequest& request) { return request.positions.empty() ? request.rover : request.positions; }
+
 std::string formulation_text(const SolveRequest& request, const SolveInputs& in) {
-  return in.base ? request.formulation : "single point (no base)";
+  return in.base ? request.formulation : !in.positions.empty() ? "none: positions of another program" : "single point (no base)";
 }
 
 std::string mode_text(const SolveRequest& request) {
@@ -121,6 +124,29 @@ std::size_t aligned_rows(const SolveOutcome& outcome) {
       std::count_if(outcome.rows.begin(), outcome.rows.end(), [](const io::TrajectoryRow& r) { return std::isfinite(r.heading_deg); }));
 }
 
+void append_stereo_figures(const SolveOutcome& outcome, std::vector<ReportEntry>& lines) {
+  const vision::AdmissionCounts& c = outcome.stereo->counts;
+  lines.emplace_back("stereo frames", std::to_string(outcome.frames));
+  lines.emplace_back("observations admitted", percent(c.of(vision::ObservationFate::admitted), static_cast<long>(c.offered())) + " of " +
+                                                  std::to_string(c.offered()));
+  lines.emplace_back("landmarks", std::to_string(c.landmarks) + ", " + std::to_string(outcome.stereo->dropped_landmarks) + " dropped as moving");
+}
+
+/// What became of frames and observations, in the order of the tests.
+std::vector<Count> frame_fates(const SolveOutcome& outcome) {
+  std::vector<Count> counts;
+  for (std::size_t f = 0; outcome.stereo && f < vision::kFrameFates; ++f)
+    if (const std::size_t n = outcome.stereo->counts.frames[f]) counts.emplace_back(vision::name_of(static_cast<vision::FrameFate>(f)), static_cast<long>(n));
+  return counts;
+}
+std::vector<Count> observation_fates(const SolveOutcome& outcome) {
+  std::vector<Count> counts;
+  for (std::size_t f = 0; outcome.stereo && f < vision::kObservationFates; ++f)
+    if (const std::size_t n = outcome.stereo->counts.observations[f])
+      counts.emplace_back(vision::name_of(static_cast<vision::ObservationFate>(f)), static_cast<long>(n));
+  return counts;
+}
+
 void append_inertial_figures(const SolveOutcome& outcome, std::vector<ReportEntry>& lines) {
   for (const AlignmentEvent& e : outcome.alignment)
     lines.emplace_back(e.aligned ? "aligned" : "alignment lost",
@@ -130,6 +156,7 @@ void append_inertial_figures(const SolveOutcome& outcome, std::vector<ReportEntr
     lines.emplace_back("accelerometer bias", vector_text(e->accel_bias_mps2, 4) + " m/s^2");
     lines.emplace_back("gyroscope bias", vector_text(e->gyro_bias_dps, 4) + " deg/s");
   }
+  if (outcome.stereo) append_stereo_figures(outcome, lines);
   if (outcome.outages.empty()) return;
   const auto longest = std::max_element(outcome.outages.begin(), outcome.outages.end(),
                                         [](const Outage& a, const Outage& b) { return a.length_s() < b.length_s(); });
@@ -141,7 +168,7 @@ std::vector<ReportEntry> run_figures(const SolveInputs& in, const SolveOutcome& 
   std::vector<ReportEntry> lines;
   long skipped = 0;
   for (const Count& c : outcome.skipped) skipped += c.second;
-  lines.emplace_back("rover epochs", std::to_string(outcome.rover_epochs));
+  lines.emplace_back(in.positions.empty() ? "rover epochs" : "positions", std::to_string(outcome.rover_epochs));
   lines.emplace_back("with a solution", percent(static_cast<std::size_t>(outcome.answered_epochs), outcome.rover_epochs));
   if (skipped) lines.emplace_back("skipped", std::to_string(skipped));
   if (in.base) {
@@ -159,13 +186,13 @@ std::vector<ReportEntry> run_figures(const SolveInputs& in, const SolveOutcome& 
 std::vector<ReportEntry> settings(const SolveRequest& request, const SolveInputs& in) {
   std::vector<ReportEntry> s;
   const auto name = [](const std::string& path) { return std::filesystem::path{path}.filename().string(); };
-  s.emplace_back("rover", name(request.rover));
+  s.emplace_back(in.positions.empty() ? "rover" : "positions", name(measurement_file(request)));
   if (in.base)
     s.emplace_back("base", name(request.base)), s.emplace_back("base, ECEF m", position_text(in.base_position_e_m)),
         s.emplace_back("base position from", in.base_position_source);
   std::string navigation;
   for (const std::string& nav : request.nav) (navigation += navigation.empty() ? "" : ", ") += name(nav);
-  s.emplace_back("navigation", navigation);
+  if (!navigation.empty()) s.emplace_back("navigation", navigation);
   s.emplace_back("robust formulation", formulation_text(request, in));
   if (in.base) {
     s.emplace_back("ambiguities", mode_text(request));
@@ -181,6 +208,10 @@ std::vector<ReportEntry> settings(const SolveRequest& request, const SolveInputs
   if (in.inertial) {
     s.emplace_back("inertial unit", name(request.imu));
     s.emplace_back("readings", io::fixed_text(in.imu_interval_s > 0 ? 1 / in.imu_interval_s : 0, 1) + " Hz");
+    if (!request.tracks.empty()) s.emplace_back("stereo tracks", name(request.tracks));
+    std::string without;
+    for (const std::string& part : request.without) (without += without.empty() ? "" : ", ") += part;
+    if (!without.empty()) s.emplace_back("screening without", without);
     s.emplace_back("lever arm (right, forward, up)", vector_text(in.inertial->lever_arm_b_m, 3) + " m");
     if (request.heading_deg)
       s.emplace_back("heading given", io::fixed_text(*request.heading_deg, 1) + " +- " + io::fixed_text(request.heading_sigma_deg, 1) + " deg");
@@ -201,13 +232,15 @@ std::vector<std::string> notes(const SolveInputs& in, const SolveOutcome& outcom
     lines.push_back("the inertial unit was never aligned, so GNSS was solved alone; it waited for " + (waits.empty() ? "readings" : waits));
   }
   for (const Count& c : outcome.skipped) lines.push_back(std::to_string(c.second) + " rover epochs without a solution: " + c.first);
+  if (outcome.stereo && outcome.stereo->refused_frames > 0)
+    lines.push_back(std::to_string(outcome.stereo->refused_frames) + " stereo frames refused, the last: " + outcome.stereo->refusal);
   for (const Count& c : outcome.incidents) lines.push_back(std::to_string(c.second) + " times " + c.first);
   lines.insert(lines.end(), in.notes.begin(), in.notes.end());
   return lines;
 }
 
 std::string title_of(const SolveRequest& request) {
-  const std::filesystem::path rover{request.rover};
+  const std::filesystem::path rover{measurement_file(request)};
   const std::string folder = std::filesystem::absolute(rover).parent_path().filename().string();
   return folder.empty() ? rover.filename().string() : folder;
 }
@@ -217,8 +250,8 @@ std::string subtitle_of(const SolveRequest& request, const SolveInputs& in, cons
   char date[48];
   std::snprintf(date, sizeof date, "%04d-%02d-%02d %02d:%02d:%02.0f GPS time", c.year, c.month, c.day, c.hour, c.minute,
                 std::floor(c.second));
-  std::string text = std::string{date} + ", " + std::to_string(outcome.rover_epochs) + " rover epochs";
-  if (in.rover.interval_s > 0) text += " at " + io::fixed_text(1 / in.rover.interval_s, in.rover.interval_s > 1 ? 3 : 0) + " Hz";
+  std::string text = std::string{date} + ", " + std::to_string(outcome.rover_epochs) + (in.positions.empty() ? " rover epochs" : " positions");
+  if (in.interval_s > 0) text += " at " + io::fixed_text(1 / in.interval_s, in.interval_s > 1 ? 3 : 0) + " Hz";
   if (in.base)
     text += std::string{in.inertial ? ", with inertial unit" : ""} + ", base " + cell(baseline_km(in, outcome), 2) + " km away, " + request.formulation + " formulation, " + mode_text(request) +
             " ambiguity resolution";
@@ -312,6 +345,12 @@ std::string summary_json(const SolveRequest& request, const SolveInputs& in, con
   member_distribution(json, "base_age_s", finite(outcome.ages_s)), member_distribution(json, "solve_ms", solve_times(outcome));
   json.member("restarts", outcome.restarts).member("released_integers", outcome.released_integers).member("wall_s", outcome.wall_s);
   if (in.inertial) member_inertial(json, outcome);
+  if (outcome.stereo) {
+    json.begin_object("stereo").member("frames", outcome.frames).member("landmarks", outcome.stereo->counts.landmarks);
+    json.member("dropped_landmarks", outcome.stereo->dropped_landmarks);
+    member_counts(json, "frame_fates", frame_fates(outcome)), member_counts(json, "observation_fates", observation_fates(outcome));
+    json.end_object();
+  }
   json.begin_array("notes");
   for (const std::string& note : in.notes) json.value(note);
   return json.end_array().end_object().text();
@@ -359,6 +398,8 @@ std::string summary_text(const SolveRequest& request, const SolveInputs& in, con
   std::string text = table.text();
   append_counts(text, "signals not used, signal epochs", rejections(outcome));
   append_counts(text, "integer resolution, epochs", outcomes(outcome));
+  append_counts(text, "stereo frames", frame_fates(outcome));
+  append_counts(text, "stereo observations", observation_fates(outcome));
   const std::vector<std::string> lines = notes(in, outcome);
   if (!lines.empty()) text += "\nnotes\n";
   for (const std::string& line : lines) text += "  " + line + '\n';
@@ -374,7 +415,7 @@ std::string write_outputs(const std::string& folder, const SolveRequest& request
   };
   io::RtklibHeader header;
   header.program = std::string{"searvins "} + kVersionString;
-  header.input_files.push_back(request.rover);
+  header.input_files.push_back(measurement_file(request));
   if (in.base) header.input_files.push_back(request.base), header.reference = position_text(in.base_position_e_m);
   header.input_files.insert(header.input_files.end(), request.nav.begin(), request.nav.end());
   const Eigen::Vector3d origin_e_m = outcome.rows.empty() ? Eigen::Vector3d{6378137, 0, 0} : outcome.rows.front().p_e_m;

@@ -13,14 +13,15 @@
 
 #include <searvins/core/status.hpp>
 #include <searvins/core/time.hpp>
-#include <searvins/estimator/inertial_motion.hpp>
 #include <searvins/estimator/rtk_options.hpp>
 #include <searvins/estimator/rtk_solution.hpp>
+#include <searvins/estimator/stereo_inertial_motion.hpp>
 #include <searvins/gnss/differenced_epoch.hpp>
 #include <searvins/gnss/ephemeris.hpp>
 #include <searvins/gnss/observation.hpp>
 #include <searvins/gnss/single_point_solution.hpp>
 #include <searvins/imu/imu_sample.hpp>
+#include <searvins/imu/position_fix.hpp>
 
 namespace searvins::examples {
 
@@ -41,6 +42,17 @@ struct AlignmentReport {
   const char* waits_for{""};  ///< in words
 };
 
+/// A frame of stereo tracks as the runs take it.
+using TrackFrame = estimator::StereoInertialMotion<>::Frame;
+
+/// How a run with a camera treated its frames.
+struct StereoReport {
+  vision::AdmissionCounts counts{};
+  long dropped_landmarks{0};  ///< found to be no fixed points when they left the window
+  long refused_frames{0};
+  const char* refusal{""};  ///< of the last of them
+};
+
 /// One estimator at work. Inputs come in the order of time; solutions are taken with next() until none is due.
 class SolverRun {
  public:
@@ -55,6 +67,8 @@ class SolverRun {
   virtual Status add_base(const gnss::ObservationEpoch& epoch) = 0;
   virtual Status add_rover(const gnss::ObservationEpoch& epoch) = 0;
   virtual Status add_imu(const imu::ImuSample&) { return failure(StatusCode::unsupported, "this run has no inertial unit"); }
+  virtual Status add_position(const imu::PositionFix&) { return failure(StatusCode::unsupported, "this run has no inertial unit"); }
+  virtual Status add_stereo(const TrackFrame&) { return failure(StatusCode::unsupported, "this run has no inertial unit"); }
   virtual Status set_heading(double, double) { return failure(StatusCode::unsupported, "this run has no inertial unit"); }
   /// No more input will come.
   virtual void finish() {}
@@ -75,6 +89,8 @@ class SolverRun {
   [[nodiscard]] virtual std::optional<LaggedEstimate> oldest() const = 0;
   /// Nothing without an inertial unit.
   [[nodiscard]] virtual std::optional<AlignmentReport> alignment() const { return std::nullopt; }
+  /// Nothing without an inertial unit.
+  [[nodiscard]] virtual std::optional<StereoReport> stereo() const { return std::nullopt; }
 
  protected:
   static constexpr const char* kNothingDue = "no solution is due";  ///< the words of estimator::Estimator
@@ -103,7 +119,7 @@ class EpochRun : public SolverRun {
 /// Settings of a run: those of the inertial part are there when it has an inertial unit.
 struct RunOptions {
   estimator::RtkOptions rtk{};
-  std::optional<estimator::InertialOptions> inertial;
+  std::optional<estimator::StereoInertialOptions> inertial;
 };
 
 std::unique_ptr<SolverRun> make_batch_run(const RunOptions& options);

@@ -139,10 +139,10 @@ TEST_CASE_FIXTURE(Fixture, "solve: usage errors exit with 2") {
   CHECK(solve("--arc 0").exit_code == 2);
   CHECK(solve("--base-ecef 1,2").exit_code == 2);
   CHECK(solve("--truth " + truth + " --truth-ecef 1,2,3").exit_code == 2);
-  for (const char* later : {"--tracks x", "--images x", "--positions x", "--dataset texcup"}) {
+  for (const char* later : {"--images x", "--dataset texcup"}) {
     const Outcome outcome = solve(later);
     CHECK_MESSAGE(outcome.exit_code == 2, later);
-    CHECK_MESSAGE(has(outcome, "this version solves GNSS and IMU only"), later);
+    CHECK_MESSAGE(has(outcome, "this version takes stereo tracks"), later);
   }
 }
 

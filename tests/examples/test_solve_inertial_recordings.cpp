@@ -253,10 +253,56 @@ TEST_CASE_FIXTURE(Fixture, "solve --imu: usage errors exit with 2 and say what i
   };
   refused("--imu " + imu, "--imu needs --rig FILE");
   refused("--rate imu", "--rate imu needs --imu FILE");
-  refused("--rate camera", "no cameras");
-  refused("--rate often", "'often' is none of gnss, imu");
+  refused("--rate camera", "--rate camera needs --tracks FILE");
+  refused("--rate often", "'often' is none of gnss, camera, imu");
+  refused("--tracks x", "--tracks x needs --imu FILE");
+  refused("--without motion --rig " + rig + " --imu " + imu, "--without needs --tracks FILE");
+  refused("--tracks x --without ears --rig " + rig + " --imu " + imu, "'ears' is none of semantic, geometric, motion, maturity");
+  refused("--positions x --rig " + rig + " --imu " + imu, "--positions is given: leave --rover out");
+  CHECK(has(run("solve --positions x --out " + path("out")), "--positions needs --imu FILE"));
   refused("--heading 90", "--heading 90 needs --imu FILE");
   refused("--heading 90,0 --rig " + rig + " --imu " + imu, "the sigma must lie in 0 .. 90");
+}
+
+TEST_CASE_FIXTURE(Fixture, "solve --positions: loosely coupled to the positions of an earlier run") {
+  REQUIRE(run("solve --rover " + rover + " --base " + data + "base.obs --nav " + data + "nav.rnx --rig " + rig + " --out " + path("gnss")).exit_code == 0);
+  const std::string positions = path("gnss/solution.pos");
+  const std::string common = " --imu " + imu + " --rig " + rig + " --truth " + data + "truth.csv --out " + path("out");
+  const Outcome outcome = run("solve --positions " + positions + common);
+  REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
+  const std::vector<io::TrajectoryRow> all = rows();
+  CHECK(all.size() >= 90);
+  CHECK(std::isfinite(all.back().heading_deg));
+  const examples::Json json = summary();
+  CHECK(json.find("errors_m")->find("availability_pct")->number > 99);
+  CHECK(json.find("errors_m")->find("horizontal")->find("rmse")->number < 0.1);
+  CHECK(json.find("inertial")->find("rows_with_attitude")->number > 40);
+  CHECK(run("solve --positions " + path("nowhere.pos") + common).exit_code == 3);
+  REQUIRE(io::write_text_file(path("empty.pos"), "% nothing\n").empty());
+  CHECK(run("solve --positions " + path("empty.pos") + common).exit_code == 3);
+  std::filesystem::remove_all(folder / "gnss");
+}
+
+TEST_CASE_FIXTURE(Fixture, "solve --tracks: frames become states, every observation has its fate, and a broken file is refused with its line") {
+  const std::string tracks = data + "stereo_tracks.csv";
+  const Outcome outcome = solve("--rate camera --tracks " + tracks);
+  REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
+  CHECK(has(outcome, "observations admitted"));
+  const std::vector<io::TrajectoryRow> all = rows();
+  CHECK(all.size() > 300);  // ten a second from alignment on
+  CHECK(std::is_sorted(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.time < b.time; }));
+  CHECK(std::any_of(all.begin(), all.end(), [](const io::TrajectoryRow& r) { return r.n_tracks > 10; }));
+  const examples::Json json = summary();
+  CHECK(json.find("errors_m")->find("horizontal")->find("max")->number < 0.3);
+  CHECK(json.find("stereo")->find("frames")->number > 800);
+  CHECK(json.find("stereo")->find("observation_fates")->find("admitted")->number > 1000);
+  const Outcome without = solve("--tracks " + tracks + " --without semantic,maturity");
+  REQUIRE_MESSAGE(without.exit_code == 0, without.output);
+  CHECK(summary().find("stereo")->find("observation_fates")->find("admitted")->number >
+        json.find("stereo")->find("observation_fates")->find("admitted")->number);
+  const Outcome broken = solve("--tracks " + replaced(tracks, "broken.csv", "t_gps_sow,track_id", "t_gps_sow,number"));
+  CHECK(broken.exit_code == 3);
+  CHECK(has(broken, "the header has no column track_id"));
 }
 
 TEST_CASE_FIXTURE(Fixture, "evaluate --report: several runs on one page") {
