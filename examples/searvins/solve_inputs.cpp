@@ -316,7 +316,7 @@ Failure take_readings(const SolveRequest& request, const Rig& rig, SolveInputs& 
   if (first > in.end || last < in.start)
     return io::Diagnostic{request.imu, 0,
                           "does not overlap the rover in time: readings from " + time_text(first) + " to " + time_text(last) +
-                              ", to solve from " + time_text(in.start) + " to " + time_text(in.end),
+                              (in.positions.empty() ? ", rover from " : ", positions from ") + time_text(in.start) + " to " + time_text(in.end),
                           "give the log of the rover's drive; its stamps must be GPS time"};
   if (first > in.start.plus_seconds(1) || last.plus_seconds(1) < in.end)
     in.notes.push_back(name + ": the readings cover only a part of the rover's time, from " + time_text(first) + " to " + time_text(last));

@@ -206,6 +206,7 @@ TEST_CASE("a subset needs a ratio that grows as it shrinks: both sides of the bo
     ++subsets;
     const auto with_bound = [&](double ratio) {  // the setting is that of ten ambiguities
       ResolutionOptions o = options;
+      o.ratio_subset_size = 10;
       o.min_ratio_partial = 1 + (ratio - 1) / std::sqrt(10.0 / out.count);
       return resolve(p.as_float(), o);
     };

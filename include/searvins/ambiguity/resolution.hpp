@@ -23,7 +23,8 @@
 ///     innovation      dp' (Q_pa Q_aa^-1 Q_ap)^-1 dp <= 16.27 (99.9 % of chi-square 3), and dp not larger than a bound in metres
 ///
 /// Under wrong integers the squared norms of n ambiguities spread by sqrt(2 n) about their mean n, so chance alone makes ratios whose distance from 1 goes
-/// with 1 / sqrt n: the bound of a subset, 1 + (r - 1) sqrt(10 / n), has its r at ten ambiguities.
+/// with 1 / sqrt n. A bound that follows, 1 + (r - 1) sqrt(n0 / n), has its r at n0 ambiguities. It is worth its price where a float is good without
+/// integers (with an inertial unit).
 ///
 /// Partial mode takes ambiguities out one by one until all gates pass or too few are left: while the success rate is short, the least precise one;
 /// afterwards the one that contradicts the candidate most, which is the largest drop of the squared norm,
@@ -76,7 +77,8 @@ struct ResolutionOptions {
   ResolutionMode mode{ResolutionMode::partial};
   double min_success_rate{0.86};
   double min_ratio{2};                  ///< second over best squared norm; 1 switches the test off
-  double min_ratio_partial{7};          ///< the same for a subset of ten: it was chosen for agreeing with its integers, so it must do so more clearly
+  double min_ratio_partial{5};          ///< the same for a subset: it was chosen for agreeing with its integers, so it must do so more clearly
+  double ratio_subset_size{0};          ///< n0 > 0: smaller subsets need more than min_ratio_partial, larger ones less; 0: all the same
   double norm_confidence{0.9999};       ///< of the chi-square bound on the best squared norm
   int min_ambiguities{5};
   double min_share_partial{0.5};        ///< a subset holds at least this share of the ambiguities that were offered
@@ -169,7 +171,8 @@ class Resolver {
 
   [[nodiscard]] double least_ratio(const ResolutionOptions& options, bool is_subset) const {
     if (!is_subset) return options.min_ratio;
-    return std::max(options.min_ratio, 1 + (options.min_ratio_partial - 1) * std::sqrt(10.0 / m_));
+    const double size = options.ratio_subset_size > 0 ? std::sqrt(options.ratio_subset_size / m_) : 1;
+    return std::max(options.min_ratio, 1 + (options.min_ratio_partial - 1) * size);
   }
 
   /// Conditions the position on the candidate: dp, Q_p|a, and Q^-1 v for the choice of what to drop.

@@ -247,10 +247,13 @@ class Estimator {
   static constexpr double kNoVelocityMps = 1e3;  ///< sigma of a velocity that there is none of
   static constexpr double kClockMarginS = 0.03;  ///< a state's time lies this much around its epoch's tag
 
-  /// With an inertial unit two satellites are worth differencing, and what codes have said is remembered over a longer way.
+  /// With an inertial unit two satellites are worth differencing, what codes have said is remembered over a longer way, and the float is good enough to ask
+  /// more of small subsets of integers.
   [[nodiscard]] static RtkOptions inertial_rtk(RtkOptions options) {
     options.min_satellites = std::min(options.min_satellites, 2);
     options.code_correlation_m *= 3;
+    options.resolution.min_ratio_partial = std::max(options.resolution.min_ratio_partial, 7.0);
+    if (!(options.resolution.ratio_subset_size > 0)) options.resolution.ratio_subset_size = 10;
     return options;
   }
   [[nodiscard]] static imu::InitializerSettings initializer_settings(const Options& options) {
