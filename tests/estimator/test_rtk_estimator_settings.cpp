@@ -79,6 +79,7 @@ const Flip kFlips[] = {
     {"code_noise.max_scale", [](RtkOptions& o) { o.code_noise.max_scale = 1.05; }},
     {"code_noise.memory_epochs", [](RtkOptions& o) { o.code_noise.memory_epochs = 2; }},
     {"use_phase", [](RtkOptions& o) { o.use_phase = false; }},
+    {"code_gate_sigmas", [](RtkOptions& o) { o.code_gate_sigmas = 0.5; }},
     {"use_doppler", [](RtkOptions& o) { o.use_doppler = false; }},
     {"lag_s", [](RtkOptions& o) { o.lag_s = 10; }},
     {"jerk_psd_m2ps5", [](RtkOptions& o) { o.jerk_psd_m2ps5 = 0.1; }},

@@ -266,7 +266,8 @@ class RtkEstimator {
         const auto P = Motion::antenna_covariance(predicted_, predicted_covariance_, antenna);
         predicted_e_m_ = frame_.to_ecef(antenna.position_w_m(predicted_));
         predicted_v_e_mps_ = frame_.R_ew * antenna.velocity_w_mps(predicted_);
-        predicted_sigma_m_ = std::sqrt(std::max(1e-4, P.template topLeftCorner<3, 3>().trace()));
+        predicted_position_m2_ = P.template topLeftCorner<3, 3>();
+        predicted_sigma_m_ = std::sqrt(std::max(1e-4, predicted_position_m2_.trace()));
         return;
       }
     }
@@ -487,14 +488,35 @@ class RtkEstimator {
     return snapshot_.solve();
   }
 
+  /// Code innovation against the prediction: r = z_s - z_p - (rho_s - rho_p) with variance (u_s - u_p)' P (u_s - u_p) + sigma_s^2 + sigma_p^2.
+  [[nodiscard]] bool passes_gate(int i, int pivot) const {
+    const gnss::CorrectedSignal &s = epoch_.signals[at(i)], &p = epoch_.signals[at(pivot)];
+    const Eigen::Vector3d to_s = predicted_e_m_ - s.satellite_e_m, to_p = predicted_e_m_ - p.satellite_e_m;
+    const double r = s.code_m - p.code_m - (gnss::range_m(predicted_e_m_, s.satellite_e_m) - gnss::range_m(predicted_e_m_, p.satellite_e_m));
+    const Eigen::Vector3d j_w = frame_.R_ew.transpose() * (to_s / to_s.norm() - to_p / to_p.norm());
+    const double variance = j_w.dot(predicted_position_m2_ * j_w) + s.code_variance_m2 + p.code_variance_m2;
+    return r * r <= options_.code_gate_sigmas * options_.code_gate_sigmas * variance;
+  }
+  /// Whether the gate holds for a group; phases of codes that fail it are left out. When most fail, the pivot is what is wrong, and none is judged by it.
+  [[nodiscard]] bool gate_codes(const gnss::SignalGroup& group) {
+    if (!(options_.code_gate_sigmas > 0) || !is_predicted_) return false;
+    int failing = 0;
+    for (std::uint16_t c : group.candidates) failing += passes_gate(c, group.pivot) ? 0 : 1;
+    if (2 * failing > static_cast<int>(group.candidates.size())) return false;
+    for (std::uint16_t c : group.candidates)
+      if (!passes_gate(c, group.pivot)) phase_usable_[c] = false;
+    return true;
+  }
+
   void add_group(int g, smoother::Key<State> state, const Eigen::Vector3d& start_e_m, RtkSolution& out) {
     const gnss::SignalGroup& group = epoch_.groups[at(g)];
     typename Problem::CodeFactor code;
     begin_batch(code, state, group.pivot);
     const auto is_room = [](const auto& f) { return !f.candidates.full(); };
     std::array<double, static_cast<std::size_t>(Cap::candidates)> variances{};
+    const bool is_gated = gate_codes(group);
     for (std::uint16_t c : group.candidates)
-      if (is_room(code)) {
+      if (is_room(code) && !(is_gated && !passes_gate(c, group.pivot))) {
         variances[code.candidates.size()] = epoch_.signals[c].code_variance_m2 * code_variance_factor_;
         (void)code.candidates.push_back({epoch_.signals[c].satellite_e_m, epoch_.signals[c].code_m});
       }
@@ -957,6 +979,7 @@ class RtkEstimator {
   Snapshot<2 * gnss::kMaxCorrectedSignals> snapshot_{};
   Eigen::Vector3d predicted_e_m_{Eigen::Vector3d::Zero()}, predicted_v_e_mps_{Eigen::Vector3d::Zero()};
   double predicted_sigma_m_{100}, clock_offset_s_{0};
+  Eigen::Matrix3d predicted_position_m2_{Eigen::Matrix3d::Identity()};  ///< of the predicted antenna, in w
   State predicted_{}, last_state_{};  ///< of the epoch at hand by the motion alone; the newest estimate
   StateCovariance predicted_covariance_{StateCovariance::Identity()}, last_covariance_{StateCovariance::Identity()};
   typename Motion::Antenna antenna_{};  ///< at the epoch at hand

@@ -56,6 +56,9 @@ struct RtkOptions {
   /// epoch do not show the errors that last over a window.
   NoiseAdaptation code_noise{.min_scale = 0.3, .max_scale = 1.7};
   NoiseAdaptation phase_noise{.min_scale = 0.3, .max_scale = 2};
+  /// Codes (with their phases) further than this many sigmas of prediction and code from the predicted double difference are left out; 0: no gate.
+  /// Off by default: what it earns on one drive it costs on another (docs/benchmarks.md).
+  double code_gate_sigmas{0};
   bool use_phase{true};
   bool use_doppler{true};
   double lag_s{6};                      ///< window length; at least arc_epochs + 1 epochs are kept whatever their interval
