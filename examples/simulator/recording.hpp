@@ -43,8 +43,8 @@ struct Recording {
 };
 
 /// Everything the recording is made from.
-struct Scene {
-  explicit Scene(std::uint64_t seed) : random(seed), orbits(make_satellites(start, random)) {}
+struct BundledScene {
+  explicit BundledScene(std::uint64_t seed) : random(seed), orbits(make_satellites(start, random)) {}
 
   /// Antenna of the rover at GPS time, ECEF.
   [[nodiscard]] Eigen::Vector3d rover_e_m(double t_s) const { return frame.to_ecef(drive.position_w_m(t_s)); }
@@ -72,13 +72,13 @@ struct Scene {
 };
 
 /// The walls at GPS time: height swings between 8 and 16 m along the street.
-[[nodiscard]] inline std::optional<Street> street_at(const Scene& scene, double t_s) {
+[[nodiscard]] inline std::optional<Street> street_at(const BundledScene& scene, double t_s) {
   if (t_s < kStreetBeginS - 0.5 || t_s >= kStreetEndS + 0.5) return std::nullopt;
   return Street{scene.drive.heading_rad(t_s), 12 + 4 * std::sin(0.4 * t_s), 11, 7};
 }
 
 /// The satellite that stands n-th highest of its constellation at the start.
-[[nodiscard]] inline int nth_highest(const Scene& scene, char system, std::size_t n) {
+[[nodiscard]] inline int nth_highest(const BundledScene& scene, char system, std::size_t n) {
   std::vector<std::pair<double, int>> by_elevation;
   for (const Orbit& o : scene.orbits)
     if (o.system == system) by_elevation.emplace_back(-flight_of(o, scene.rover_e_m(0), 0).line.elevation_rad, o.number);
@@ -87,14 +87,14 @@ struct Scene {
 }
 
 /// What goes wrong with the rover's phases in the open: a flagged slip, two that nobody flags, a half cycle that is resolved 4 s later.
-[[nodiscard]] inline std::vector<PhaseEvent> phase_events(const Scene& scene) {
+[[nodiscard]] inline std::vector<PhaseEvent> phase_events(const BundledScene& scene) {
   return {{26, 1e9, 'G', nth_highest(scene, 'G', 2), "1C", 5, 1},
           {34, 1e9, 'E', nth_highest(scene, 'E', 1), "1C", 1, 0},
           {42, 1e9, 'C', nth_highest(scene, 'C', 2), "2I", -3, 0},
           {46, 50, 'G', nth_highest(scene, 'G', 3), "2W", 0.5, 2}};
 }
 
-[[nodiscard]] inline ReceiverPlan rover_plan(const Scene& scene) {
+[[nodiscard]] inline ReceiverPlan rover_plan(const BundledScene& scene) {
   ReceiverPlan plan;
   plan.position_e_m = [&scene](double t_s) { return scene.rover_e_m(t_s); };
   plan.street = [&scene](double t_s) { return street_at(scene, t_s); };
@@ -105,7 +105,7 @@ struct Scene {
   return plan;
 }
 
-[[nodiscard]] inline ReceiverPlan base_plan(const Scene& scene) {
+[[nodiscard]] inline ReceiverPlan base_plan(const BundledScene& scene) {
   ReceiverPlan plan;
   plan.position_e_m = [&scene](double) { return scene.base_e_m; };
   plan.clock = scene.base_clock;
@@ -114,7 +114,7 @@ struct Scene {
 }
 
 /// Observation file of a receiver; an epoch without satellites is not written.
-[[nodiscard]] inline std::string observation_file(const std::string& marker, const Scene& scene, Receiver& receiver,
+[[nodiscard]] inline std::string observation_file(const std::string& marker, const BundledScene& scene, Receiver& receiver,
                                                   const Eigen::Vector3d& header_e_m) {
   std::string text = observation_header(marker, header_e_m, scene.start);
   for (int k = 0; k < kEpochs; ++k) {
@@ -125,7 +125,7 @@ struct Scene {
 }
 
 /// Antenna of the rover at 5 Hz of GPS time, from 1 s before the first epoch to 1 s after the last.
-[[nodiscard]] inline std::string truth_file(const Scene& scene) {
+[[nodiscard]] inline std::string truth_file(const BundledScene& scene) {
   std::string text = "gps_week,sow,ecef_x_m,ecef_y_m,ecef_z_m\n";
   for (int k = -5; k <= 5 * kEpochs; ++k) {
     const GpsTime t = scene.start.plus_seconds(0.2 * k);
@@ -136,7 +136,7 @@ struct Scene {
 }
 
 /// The broadcast records of the satellites that base or rover could see.
-[[nodiscard]] inline std::vector<Orbit> risen(const Scene& scene) {
+[[nodiscard]] inline std::vector<Orbit> risen(const BundledScene& scene) {
   std::vector<Orbit> up;
   for (const Orbit& o : scene.orbits)
     if (flight_of(o, scene.base_e_m, 0).line.elevation_rad > 0) up.push_back(o);
@@ -145,7 +145,7 @@ struct Scene {
 
 /// Makes the recording of a seed.
 [[nodiscard]] inline Recording make_recording(std::uint64_t seed) {
-  const Scene scene(seed);
+  const BundledScene scene(seed);
   Receiver rover(rover_plan(scene), scene.orbits, seed + 1), base(base_plan(scene), scene.orbits, seed + 2);
   return {observation_file("ROVER", scene, rover, scene.rover_e_m(0)), observation_file("BASE", scene, base, scene.base_e_m),
           navigation_file(risen(scene)), truth_file(scene)};

@@ -122,7 +122,7 @@ TEST_CASE("one wall: its outline in the class image is where its corners project
     CHECK(std::all_of(picture.inverse_depth.begin(), picture.inverse_depth.end(), [](float x) { return x == 0; }));
     ++edges;
   });
-  CHECK(edges > 60);
+  CHECK(3 * edges > static_cast<int>(test::property_runs(150)));  // a wall may be out of sight
 }
 
 TEST_CASE("outlines are smooth: a pixel's brightness is its covered share") {

@@ -34,7 +34,7 @@ std::filesystem::path folder() { return std::filesystem::path{SEARVINS_SOURCE_DI
 
 /// The scene and the recording as the library reads it, once for all tests.
 struct Bundle {
-  simulator::Scene scene{simulator::kBundledSeed};
+  simulator::BundledScene scene{simulator::kBundledSeed};
   io::Parsed<io::RinexObservationFile> rover = io::read_rinex_observation(folder() / "rover.obs");
   io::Parsed<io::RinexObservationFile> base = io::read_rinex_observation(folder() / "base.obs");
   io::Parsed<io::RinexNavigationFile> navigation = io::read_rinex_navigation(folder() / "nav.rnx");

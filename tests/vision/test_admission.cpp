@@ -322,19 +322,39 @@ TEST_CASE("bad input: 5000 keypoints: what has no room in the frame or in the ta
   CHECK(run.out->observations.size() > 10);
 }
 
+TEST_CASE("admission: what the frontend says to lie near a rejected class is refused as its boundary") {
+  Rng rng{14};
+  Run run(rng);
+  run.warm_up();
+  (void)run.step([](Frame& f) { f.observations[0].near_rejected_class = f.observations[4].near_rejected_class = true; });
+  CHECK(run.fated(ObservationFate::semantic_boundary) == 2);
+  CHECK(run.out->fates[4] == ObservationFate::semantic_boundary);
+  AdmissionOptions blind = sharp_options();
+  blind.use_semantic = false;
+  Run without(rng, blind);
+  without.warm_up();
+  (void)without.step([](Frame& f) { f.observations[0].near_rejected_class = true; });
+  CHECK(without.fated(ObservationFate::semantic_boundary) == 0);
+}
+
 TEST_CASE("bad input: duplicated track numbers: none of them is believed, and the track breaks") {
   Rng rng{10};
   Run run(rng);
   run.warm_up();
-  std::uint64_t twice = 0;
+  // Of a track that exists already: a new one would not be kept after this frame, and nothing would break.
+  std::uint64_t thrice = 0;
   (void)run.step([&](Frame& f) {
-    twice = f.observations[3].track;
-    f.observations[7].track = twice;
-    f.observations[9].track = twice;
+    std::size_t i = 0;
+    while (run.admission->tracks().find(f.observations[i].track) == nullptr) ++i;
+    thrice = f.observations[i].track;
+    f.observations[i + 1].track = thrice;
+    f.observations[i + 2].track = thrice;
   });
   CHECK(run.fated(ObservationFate::duplicate_track) == 3);
-  for (const AdmittedObservation& o : run.out->observations) CHECK(o.track != twice);
-  CHECK(run.admission->tracks().find(twice)->stage == TrackStage::broken);
+  for (const AdmittedObservation& o : run.out->observations) CHECK(o.track != thrice);
+  const auto* const track = run.admission->tracks().find(thrice);
+  REQUIRE(track != nullptr);
+  CHECK(track->stage == TrackStage::broken);
   CHECK(run.out->fate == FrameFate::full);
 }
 

@@ -19,11 +19,11 @@ CameraMotion forward(double way_m, double turn_rad = 0) { return {so3::exp(Eigen
 TEST_CASE("stop cue: five still frames in a row raise it, one other ends it") {
   const Matrix6 sharp = 1e-8 * Matrix6::Identity();
   StopCue cue;
-  const auto still = [&] { return cue.add(forward(0.003), sharp, 0.2, 0.2); };
+  const auto still = [&] { return cue.add(forward(0.003), sharp, 0.2, 0.2, 0.1); };
   for (int i = 1; i <= 4; ++i) CHECK_FALSE(still());
   CHECK(still());
   CHECK(still());
-  CHECK_FALSE(cue.add(forward(0.03), sharp, 0.2, 0.2));
+  CHECK_FALSE(cue.add(forward(0.03), sharp, 0.2, 0.2, 0.1));
   for (int i = 1; i <= 4; ++i) CHECK_FALSE(still());
   CHECK(still());
   cue.reset();
@@ -34,7 +34,7 @@ TEST_CASE("stop cue: way, turn and displacement count each; noise that explains 
   const Matrix6 sharp = 1e-8 * Matrix6::Identity();
   const auto up = [](const CameraMotion& motion, const Matrix6& covariance, double median_px, double rms_px) {
     StopCue cue;
-    for (int i = 0; i < 5; ++i) (void)cue.add(motion, covariance, median_px, rms_px);
+    for (int i = 0; i < 5; ++i) (void)cue.add(motion, covariance, median_px, rms_px, 0.1);
     return cue.up();
   };
   CHECK(up(forward(0.019), sharp, 0.2, 0.2));
@@ -49,4 +49,20 @@ TEST_CASE("stop cue: way, turn and displacement count each; noise that explains 
   CHECK_FALSE(up(forward(0.07), noisy, 0.2, 0.7));
   CHECK_FALSE(up(forward(0), 9 * noisy, 0.2, 0.7));  // sigma 0.09 m: who knows
   CHECK_FALSE(up(forward(std::numeric_limits<double>::quiet_NaN()), sharp, 0.2, 0.2));
+}
+
+TEST_CASE("stop cue: the bound on the way is one on speed for a fast camera") {
+  const Matrix6 sharp = 1e-8 * Matrix6::Identity();
+  for (const double rate_hz : {10.0, 20.0, 30.0, 60.0}) {
+    const auto up_at = [&](double speed_mps) {
+      StopCue cue;
+      for (int i = 0; i < 5; ++i) (void)cue.add(forward(speed_mps / rate_hz), sharp, 0.2, 0.2, 1 / rate_hz);
+      return cue.up();
+    };
+    CHECK(up_at(0.19));
+    CHECK_FALSE(up_at(0.21));
+  }
+  StopCue slow;  // at two frames a second 2 cm count
+  for (int i = 0; i < 5; ++i) (void)slow.add(forward(0.03), sharp, 0.2, 0.2, 0.5);
+  CHECK_FALSE(slow.up());
 }

@@ -147,7 +147,8 @@ class StereoAdmission {
     const std::size_t usable = count(out, ObservationFate::maturing);
     if (usable == 0) return reject(all_masked(out) ? FrameFate::masked : FrameFate::nothing_usable, out);
 
-    const bool has_previous = reference_time_ && seconds_between(*reference_time_, frame.time) <= options_.max_gap_s;
+    const double step_s = reference_time_ ? seconds_between(*reference_time_, frame.time) : 0;
+    const bool has_previous = reference_time_ && step_s <= options_.max_gap_s;
     if (!has_previous) tracks_.clear();
     tracks_.begin_frame();
     reference_time_ = frame.time;
@@ -161,7 +162,7 @@ class StereoAdmission {
       stop_.reset();
       out.fate = FrameFate::no_previous;
     } else {
-      status = check_motion(frame, predicted, out);
+      status = check_motion(frame, predicted, step_s, out);
     }
     follow_tracks(frame, out);
     admit(frame, out);
@@ -194,6 +195,7 @@ class StereoAdmission {
   [[nodiscard]] ObservationFate screen_class(const StereoObservation& o, const Left& left, const Right& right) const {
     const SemanticRules& rules = options_.semantic;
     if (rules.rejects(o.semantic_class)) return ObservationFate::semantic_class;
+    if (o.near_rejected_class) return ObservationFate::semantic_boundary;
     const SemanticVerdict in_left = screen(rules, left, o.pixel_px[0], o.pixel_px[2], camera_.width_px);
     const SemanticVerdict in_right = screen(rules, right, o.pixel_px[1], o.pixel_px[2], camera_.width_px);
     if (in_left == SemanticVerdict::rejected_class || in_right == SemanticVerdict::rejected_class) return ObservationFate::semantic_class;
@@ -220,8 +222,8 @@ class StereoAdmission {
     return count(out, ObservationFate::semantic_class) + count(out, ObservationFate::semantic_boundary) == out.fates.size();
   }
 
-  /// PnP on what was seen in the previous frame too; marks outliers, decides on the frame.
-  [[nodiscard]] Status check_motion(const Frame& frame, const std::optional<PredictedMotion>& predicted, Admitted& out) {
+  /// PnP on what was seen in the previous frame too, `step_s` ago; marks outliers, decides on the frame.
+  [[nodiscard]] Status check_motion(const Frame& frame, const std::optional<PredictedMotion>& predicted, double step_s, Admitted& out) {
     pairs_.clear();
     order_.clear();  // observation of each pair
     for (std::size_t i = 0; i < frame.observations.size(); ++i) {
@@ -245,7 +247,7 @@ class StereoAdmission {
     out.sigma_scale = sigma_scale(out.pnp, options_.pnp.sigma_px);
     for (std::size_t k = 0; k < pairs_.size(); ++k)
       if (!pnp_.is_inlier(k)) out.fates[order_[k]] = ObservationFate::motion_outlier;
-    (void)stop_.add(out.motion, out.covariance, median_displacement_px(), out.pnp.rms_px);
+    (void)stop_.add(out.motion, out.covariance, median_displacement_px(), out.pnp.rms_px, step_s);
     judge_motion(predicted, out);
     return ok_status();
   }

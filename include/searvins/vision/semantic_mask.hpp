@@ -10,8 +10,8 @@
 ///     refused   if  |pixel - point| <= (erosion + buffer(class)) width / 2048     for a pixel of a rejected class
 ///
 /// Margins are given for an image of 2048 px width and shrink or grow with it. A mask may be coarser than the image: LabelImage has its
-/// own scale. Frontends without images say the class of each observation (StereoObservation::semantic_class); that one is screened by the
-/// same rules, without margin, and NoMask stands for the missing image.
+/// own scale. Where the estimator has no labels, NoMask stands for them, and the frontend says the class of each observation
+/// (StereoObservation::semantic_class) and, if it has the labels itself, whether the margin is violated (near_rejected_class).
 #pragma once
 
 #include <algorithm>

@@ -31,6 +31,7 @@ struct StereoObservation {
   double score{1};                                    ///< confidence of the matches in [0, 1], the lower of stereo and temporal
   double v_difference_px{std::numeric_limits<double>::quiet_NaN()};  ///< v_left - v_right of the match; NaN: the frontend does not say
   SemanticClass semantic_class{kUnlabelled};                         ///< class at the left pixel
+  bool near_rejected_class{false};  ///< the frontend has the labels, and one of a class to be rejected lies within the margin (screen())
 
   [[nodiscard]] double disparity_px() const { return pixel_px[0] - pixel_px[1]; }
   [[nodiscard]] bool finite() const { return pixel_px.allFinite() && std::isfinite(score); }
