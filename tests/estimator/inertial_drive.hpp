@@ -136,6 +136,11 @@ struct Run {
   int alignments{0};
 };
 
+inline double median(std::vector<double> v) {
+  std::sort(v.begin(), v.end());
+  return v[v.size() / 2];
+}
+
 /// Takes all solutions that are due.
 inline void drain(InertialUnderTest& e, Run& run) {
   for (;;) {
@@ -144,7 +149,7 @@ inline void drain(InertialUnderTest& e, Run& run) {
       run.solutions.push_back(*s);
       continue;
     }
-    if (s.status().code == StatusCode::no_data && std::string{s.status().what} == "no solution is due") return;
+    if (estimator::is_nothing_due(s.status())) return;
     ++run.errors;
   }
 }

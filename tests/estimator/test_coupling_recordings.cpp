@@ -103,11 +103,6 @@ InertialDrive spirent_drive(const std::filesystem::path& shared, std::uint64_t s
   return d;
 }
 
-double median(std::vector<double> v) {
-  std::sort(v.begin(), v.end());
-  return v[v.size() / 2];
-}
-
 }  // namespace
 
 TEST_CASE("spirent_rose with readings made from its truth: aligned while moving, fixed, millimetres, and through 15 s without GNSS") {

@@ -307,11 +307,6 @@ struct Outage {
   double error_m{0}, sigma_m{0}, nees{0};
 };
 
-double median(std::vector<double> v) {
-  std::sort(v.begin(), v.end());
-  return v[v.size() / 2];
-}
-
 }  // namespace
 
 TEST_CASE(

@@ -55,7 +55,7 @@ StereoRun run_with(const InertialDrive& d, const StereoUnderTest::Options& optio
   StereoRun run;
   std::size_t next = 0;
   const auto take = [&] {
-    for (auto s = e.next(); s.ok() || std::string{s.status().what} != "no solution is due"; s = e.next())
+    for (auto s = e.next(); s.ok() || !estimator::is_nothing_due(s.status()); s = e.next())
       s.ok() ? run.solutions.push_back(*s) : static_cast<void>(++run.errors);
   };
   for (const Arrival& a : all) {

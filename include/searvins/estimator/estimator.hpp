@@ -178,11 +178,11 @@ class Estimator {
   /// No more input will come: what waits is due.
   void finish() { finished_ = true; }
 
-  /// The next solution that is due. Errors: no_data when none is; else what is wrong with the epoch that was next (it is gone then).
+  /// The next solution that is due. Errors: no_data when none is (is_nothing_due()); else what is wrong with the epoch that was next (it is gone then).
   Result<RtkSolution> next() {
     if constexpr (Motion::has_camera)
       while (is_frame_next()) {
-        if (!is_frame_due(frames_.front().time)) return failure(StatusCode::no_data, "no solution is due");
+        if (!is_frame_due(frames_.front().time)) return failure(StatusCode::no_data, kNothingDue);
         stereo_frame_ = frames_.front();
         frames_.pop();
         Result<RtkSolution> seen = solve(stereo_frame_);
@@ -201,7 +201,7 @@ class Estimator {
       return answer(solve(fix));
     }
     if (is_silent()) return answer(bridge());
-    return failure(StatusCode::no_data, "no solution is due");
+    return failure(StatusCode::no_data, kNothingDue);
   }
 
   /// The antenna at a time after the newest state, from readings alone: output at the unit's rate. Errors: no_data (not aligned, not covered).

@@ -497,15 +497,21 @@ class RtkEstimator {
     const double variance = j_w.dot(predicted_position_m2_ * j_w) + s.code_variance_m2 + p.code_variance_m2;
     return r * r <= options_.code_gate_sigmas * options_.code_gate_sigmas * variance;
   }
-  /// Whether the gate holds for a group; phases of codes that fail it are left out. When most fail, the pivot is what is wrong, and none is judged by it.
-  [[nodiscard]] bool gate_codes(const gnss::SignalGroup& group) {
-    if (!(options_.code_gate_sigmas > 0) || !is_predicted_) return false;
+  /// Fills code_usable_ for a group; phases of codes that fail the gate are left out. When most fail, the pivot is what is wrong, and none is judged by it.
+  void gate_codes(const gnss::SignalGroup& group) {
+    code_usable_.clear();
+    const bool is_on = options_.code_gate_sigmas > 0 && is_predicted_;
     int failing = 0;
-    for (std::uint16_t c : group.candidates) failing += passes_gate(c, group.pivot) ? 0 : 1;
-    if (2 * failing > static_cast<int>(group.candidates.size())) return false;
-    for (std::uint16_t c : group.candidates)
-      if (!passes_gate(c, group.pivot)) phase_usable_[c] = false;
-    return true;
+    for (std::uint16_t c : group.candidates) {
+      (void)code_usable_.push_back(!is_on || passes_gate(c, group.pivot));
+      failing += code_usable_.back() ? 0 : 1;
+    }
+    if (2 * failing > static_cast<int>(group.candidates.size())) {
+      for (bool& usable : code_usable_) usable = true;
+      return;
+    }
+    for (std::size_t k = 0; k < group.candidates.size(); ++k)
+      if (!code_usable_[k]) phase_usable_[group.candidates[k]] = false;
   }
 
   void add_group(int g, smoother::Key<State> state, const Eigen::Vector3d& start_e_m, RtkSolution& out) {
@@ -514,9 +520,9 @@ class RtkEstimator {
     begin_batch(code, state, group.pivot);
     const auto is_room = [](const auto& f) { return !f.candidates.full(); };
     std::array<double, static_cast<std::size_t>(Cap::candidates)> variances{};
-    const bool is_gated = gate_codes(group);
-    for (std::uint16_t c : group.candidates)
-      if (is_room(code) && !(is_gated && !passes_gate(c, group.pivot))) {
+    gate_codes(group);
+    for (std::size_t k = 0; k < group.candidates.size(); ++k)
+      if (const std::uint16_t c = group.candidates[k]; is_room(code) && code_usable_[k]) {
         variances[code.candidates.size()] = epoch_.signals[c].code_variance_m2 * code_variance_factor_;
         (void)code.candidates.push_back({epoch_.signals[c].satellite_e_m, epoch_.signals[c].code_m});
       }
@@ -970,7 +976,8 @@ class RtkEstimator {
   StaticVector<Node, static_cast<std::size_t>(Cap::states)> nodes_{};
   StaticVector<Held, static_cast<std::size_t>(Cap::fixes)> held_{};
   StaticVector<Difference, kPhasesSize> differences_{};
-  StaticVector<bool, gnss::kMaxCorrectedSignals> phase_usable_{};
+  StaticVector<bool, gnss::kMaxCorrectedSignals> phase_usable_{};  ///< by signal
+  StaticVector<bool, gnss::kMaxCorrectedSignals> code_usable_{};   ///< by candidate of the group at hand
   StaticVector<smoother::Key<typename Problem::CodeFactor>, gnss::kMaxSignalGroups> code_keys_{};
   StaticVector<smoother::Key<typename Problem::PhaseFactor>, gnss::kMaxSignalGroups> phase_keys_{};
   StaticVector<smoother::AnyKey, 2 * kPhasesSize + 1> keys_{};

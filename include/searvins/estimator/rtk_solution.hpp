@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <string_view>
 
 #include <searvins/ambiguity/resolution.hpp>
 #include <searvins/core/status.hpp>
@@ -68,5 +69,13 @@ struct RtkSolution {
   Eigen::Vector3d accel_bias_b_mps2{Eigen::Vector3d::Zero()}, gyro_bias_b_radps{Eigen::Vector3d::Zero()};
   Status smoother_status{};  ///< of the last optimisation
 };
+
+/// What Estimator::next() says when no solution is due.
+inline constexpr const char* kNothingDue = "no solution is due";
+
+/// Whether a status of next() says that nothing is due, rather than what is wrong with the epoch that was next.
+[[nodiscard]] inline bool is_nothing_due(const Status& s) {
+  return s.code == StatusCode::no_data && std::string_view{s.what} == kNothingDue;
+}
 
 }  // namespace searvins::estimator
