@@ -35,8 +35,9 @@ using TestState = VectorVariable<3, smoother::Role::state, 0>;
 using TestChain = VectorVariable<1, smoother::Role::chain, 1>;
 using TestLocal = VectorVariable<2, smoother::Role::local, 2>;
 
-/// e = A_1 x_1 + A_2 x_2 + ... - b over any mix of variables, two rows.
-struct LinearFactor {
+/// e = A_1 x_1 + A_2 x_2 + ... - b over any mix of variables, two rows. Of a state it touches the first StateAxes axes.
+template <int StateAxes>
+struct BasicLinearFactor {
   using Scalar = double;
   static constexpr int max_rows = 2, max_keys = 4, max_columns = 9;
   static constexpr const char* name = "linear";
@@ -47,6 +48,14 @@ struct LinearFactor {
   Eigen::Vector2d b = Eigen::Vector2d::Zero();
 
   int rows() const { return 2; }
+  template <class V>
+  static constexpr int leading_axes() {
+    return V::role == smoother::Role::state ? StateAxes : V::dof;
+  }
+  /// Columns that are zeros by what leading_axes() says.
+  void clear_untouched_columns() {
+    for (std::size_t k = 0; k < states.size(); ++k) A.middleCols(static_cast<int>(3 * k) + StateAxes, 3 - StateAxes).setZero();
+  }
   template <class Visit>
   void for_each_key(Visit&& visit) const {
     for (const auto& k : states) visit(k);
@@ -74,10 +83,13 @@ struct LinearFactor {
   double weigh(const double* e, double* w) const { return smoother::weigh_gaussian(e, 2, w); }
 };
 
+using LinearFactor = BasicLinearFactor<3>;
+using PoseFactor = BasicLinearFactor<1>;
+
 struct LinearProblem {
   using Scalar = double;
   using Variables = smoother::Types<smoother::Capacity<TestState, 12>, smoother::Capacity<TestChain, 24>, smoother::Capacity<TestLocal, 24>>;
-  using Factors = smoother::Types<smoother::Capacity<LinearFactor, 400>>;
+  using Factors = smoother::Types<smoother::Capacity<LinearFactor, 400>, smoother::Capacity<PoseFactor, 200>>;
   static constexpr int max_front_dimension = 64;
   static constexpr int member_capacity = 600;
   static constexpr std::size_t arena_scalars = 12 * 65 * 65;
@@ -100,7 +112,8 @@ struct DenseBatch {
     first[id(key)] = columns;
     columns += V::dof;
   }
-  void add(const LinearFactor& f) {
+  template <int Axes>
+  void add(const BasicLinearFactor<Axes>& f) {
     for (int r = 0; r < 2; ++r) {
       Eigen::VectorXd row = Eigen::VectorXd::Zero(columns);
       int c = 0;

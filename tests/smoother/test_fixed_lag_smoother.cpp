@@ -18,12 +18,15 @@ struct RandomDrive {
   std::vector<Key<TestChain>> chains;
   std::vector<Key<TestLocal>> locals;
   std::int64_t epoch{0};
+  double share_of_pose_factors{0};  ///< of the factors of local variables: those that touch one axis of their state
 
-  void add_factor(Rng& rng, LinearFactor f) {
+  template <class F>
+  void add_factor(Rng& rng, F f) {
     for (int r = 0; r < 2; ++r) {
       for (int c = 0; c < 9; ++c) f.A(r, c) = normal(rng);
       f.b[r] = normal(rng, 3.0);
     }
+    f.clear_untouched_columns();
     REQUIRE(smoother->add_factor(f).ok());
     batch.add(f);
   }
@@ -67,14 +70,17 @@ struct RandomDrive {
       (void)f.locals.push_back(locals.back());
       add_factor(rng, f);
     }
-    for (const auto& l : locals) {
-      LinearFactor f;
-      (void)f.states.push_back(now);
-      if (!chains.empty() && chance(rng, 0.3)) (void)f.chains.push_back(chains.back());
-      (void)f.locals.push_back(l);
-      add_factor(rng, f);
-    }
+    for (const auto& l : locals) chance(rng, share_of_pose_factors) ? see<PoseFactor>(rng, l) : see<LinearFactor>(rng, l);
     if (locals.size() > 3 || (!locals.empty() && chance(rng, 0.3))) locals.erase(locals.begin());
+  }
+  /// A local variable seen from the newest state.
+  template <class F>
+  void see(Rng& rng, const Key<TestLocal>& local) {
+    F f;
+    (void)f.states.push_back(states.back());
+    if (!chains.empty() && chance(rng, 0.3)) (void)f.chains.push_back(chains.back());
+    (void)f.locals.push_back(local);
+    add_factor(rng, f);
   }
   void marginalise() {
     const auto report = smoother->marginalise_oldest();
@@ -89,6 +95,7 @@ struct RandomDrive {
 TEST_CASE("a linear drive through the sliding window equals the dense batch solution, value and covariance, to 1e-9") {
   for_all_seeds(60, [](Rng& rng) {
     RandomDrive drive;
+    drive.share_of_pose_factors = std::array{0.0, 0.5, 1.0}[static_cast<std::size_t>(integer(rng, 0, 2))];
     for (int k = 0; k < 14; ++k) {
       drive.step(rng);
       const auto report = drive.smoother->optimise();

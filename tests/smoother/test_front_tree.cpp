@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -41,13 +42,14 @@ struct RandomWindow {
       std::vector<Key<TestChain>> two{chains[c]};
       if (chance(rng, 0.5)) two.push_back(chains[(c + 1) % chains.size()]);
       if (chance(rng, 0.3))
-        tie({states[s]}, {}, {locals[below(locals.size())]});
+        chance(rng, 0.5) ? tie({states[s]}, {}, {locals[below(locals.size())]}) : tie<PoseFactor>({states[s]}, {}, {locals[below(locals.size())]});
       else
         tie({states[s]}, two, {});
     }
   }
+  template <class F = LinearFactor>
   void tie(const std::vector<Key<TestState>>& s, const std::vector<Key<TestChain>>& c, const std::vector<Key<TestLocal>>& l) {
-    LinearFactor f;
+    F f;
     for (const auto& k : s) REQUIRE(f.states.push_back(k));
     for (const auto& k : c) REQUIRE(f.chains.push_back(k));
     for (const auto& k : l) REQUIRE(f.locals.push_back(k));
@@ -126,7 +128,7 @@ TEST_CASE("a front's variables cover its factors and its children's separators; 
         const int id = tree->member(front.first + k), later = tables.variable(id).front;
         CHECK(later > f);
         earliest = earliest < 0 ? later : std::min(earliest, later);
-        rows += tables.variable(id).dof;
+        rows += tree->axes(front.first + k);
         if (front.parent >= 0) {
           const Front& parent = tree->front(front.parent);
           CHECK(holds(*tree, parent, 0, parent.eliminated + parent.separated, id));
@@ -169,4 +171,60 @@ TEST_CASE("a prior is summed where its first variable is eliminated; too few pla
   CHECK(tree->prior_front() == -1);
   const auto narrow = std::make_unique<smoother::FrontTree<TestWindow::TablesType, 3>>();
   CHECK_FALSE(narrow->analyse(tables, kNoPrior));
+}
+
+TEST_CASE("of a separator's variable those axes are rows that a factor or a child's separator touches") {
+  for_all_seeds(200, [](Rng& rng) {
+    RandomWindow w(rng);
+    TestWindow& window = *w.window;
+    auto tree = std::make_unique<Tree>();
+    REQUIRE(tree->analyse(window.tables, kNoPrior));
+    std::vector<std::map<int, int>> expected(static_cast<std::size_t>(tree->count()));  // by front: variable -> axes
+    for (int f = 0; f < tree->count(); ++f) {
+      const Front& front = tree->front(f);
+      auto& axes = expected[static_cast<std::size_t>(f)];
+      const auto need = [&](int id, int n) {
+        const auto& v = window.tables.variable(id);
+        if (v.role != Role::local && v.front != f) axes[id] = std::max(axes[id], n);
+      };
+      for (int id : factors_of(window, front)) {
+        const auto& factor = window.tables.factor(id);
+        for (int k = 0; k < factor.keys; ++k) need(window.tables.variables_of(factor)[k], window.tables.axes_of(factor)[k]);
+      }
+      for (int c = 0; c < f; ++c)
+        if (tree->front(c).parent == f)
+          for (const auto& [id, n] : expected[static_cast<std::size_t>(c)]) need(id, n);
+      int rows = 0;
+      for (int k = front.first + front.eliminated; k < front.first + front.eliminated + front.separated; ++k) {
+        CHECK(tree->axes(k) == axes.at(tree->member(k)));
+        rows += tree->axes(k);
+      }
+      CHECK(static_cast<std::size_t>(front.separated) == axes.size());
+      CHECK(front.rows_s == rows);
+    }
+  });
+}
+
+TEST_CASE("a local variable seen from six states ties the axes that its factors touch") {
+  const auto rows = []<class F>(F) {
+    TestWindow window;
+    const Key<TestLocal> local = *window.add_variable(TestLocal{}, GpsTime{0});
+    Key<TestState> before{};
+    for (int k = 0; k < 6; ++k) {
+      const Key<TestState> state = *window.add_variable(TestState{}, GpsTime{k});
+      F sight;
+      REQUIRE((sight.states.push_back(state) && sight.locals.push_back(local)));
+      REQUIRE(window.add_factor(sight).ok());
+      LinearFactor tie;
+      REQUIRE(tie.states.push_back(state));
+      if (k > 0) REQUIRE(tie.states.push_back(before));
+      REQUIRE(window.add_factor(tie).ok());
+      before = state;
+    }
+    auto tree = std::make_unique<Tree>();
+    REQUIRE(tree->analyse(window.tables, kNoPrior));
+    return tree->front(0).rows_s;
+  };
+  CHECK(rows(LinearFactor{}) == 5 * 3);
+  CHECK(rows(PoseFactor{}) == 3 + 4 * 1);  // the next state whole, by the tie
 }

@@ -88,6 +88,8 @@ class Elimination {
   [[nodiscard]] const Front& front(int f) const { return tree_.front(f); }
   [[nodiscard]] int tangent_size() const { return tree_.tangent_size(); }
   [[nodiscard]] int member(int i) const { return tree_.member(i); }
+  /// Leading axes of member i that are rows of its front.
+  [[nodiscard]] int axes(int i) const { return tree_.axes(i); }
   [[nodiscard]] int first_dirty() const { return tree_.first_dirty(); }
   void mark_dirty_from(int f) { tree_.mark_dirty_from(f); }
   [[nodiscard]] const Scalar* factor_of(int f) const { return arena_.data() + front(f).storage; }
@@ -148,7 +150,7 @@ class Elimination {
       int row = front.rows_e;
       for (int k = front.eliminated; k < front.eliminated + front.separated; ++k) {
         const VariableInfo& info = tables.variable(member(front.first + k));
-        for (int i = 0; i < info.dof; ++i, ++row) {
+        for (int i = 0; i < axes(front.first + k); ++i, ++row) {
           Scalar s = 0;
           for (int j = 0; j < front.rows_e; ++j) s += L[static_cast<std::ptrdiff_t>(j) * ld + row] * y[j];
           b[info.offset + i] -= s;
@@ -226,7 +228,7 @@ class Elimination {
     for (int k = 0; k < front.eliminated + front.separated; ++k) {
       VariableInfo& info = tables.variable(member(front.first + k));
       info.position = column;
-      column += info.dof;
+      column += axes(front.first + k);
     }
     ld_ = column + 1;
   }
@@ -239,7 +241,7 @@ class Elimination {
     int row = 0;
     for (int k = child.eliminated; k < child.eliminated + child.separated; ++k) {
       const VariableInfo& info = tables.variable(member(child.first + k));
-      for (int i = 0; i < info.dof; ++i, ++row) {
+      for (int i = 0; i < axes(child.first + k); ++i, ++row) {
         map_[at(row)] = info.position + i;
         reference_[at(info.position + i)] += reference[row];
       }
@@ -254,7 +256,7 @@ class Elimination {
   void add_prior(TablesType& tables, const Prior& prior) {
     for (int id : prior.variables) {
       const VariableInfo& info = tables.variable(id);
-      for (int i = 0; i < info.dof; ++i) {
+      for (int i = 0; i < info.prior_axes; ++i) {
         map_[at(info.prior + i)] = info.position + i;
         reference_[at(info.position + i)] += prior.reference[at(info.prior + i)];
       }
@@ -280,7 +282,7 @@ class Elimination {
       for (int d = 0; d < v.dof; ++d, ++column) {
         const RowSpan span = span_[at(column)] = tables.span(f, column);
         target_[at(column)] = v.role == Role::local ? d : v.position + d;
-        if (span.empty()) continue;
+        if (span.empty() || d >= tables.axes_of(f)[k]) continue;
         (void)(v.role == Role::local ? local_ : span.single() ? single_ : wide_).push_back(column);
         scale_column(tables.jacobian_column(f, column), span, column);
       }
@@ -459,7 +461,7 @@ class Elimination {
     int row = 0;
     for (int k = front.eliminated; k < front.eliminated + front.separated; ++k) {
       const VariableInfo& info = tables.variable(member(front.first + k));
-      for (int i = 0; i < info.dof; ++i) separator_[at(row++)] = stacked[info.offset + i];
+      for (int i = 0; i < axes(front.first + k); ++i) separator_[at(row++)] = stacked[info.offset + i];
     }
   }
 

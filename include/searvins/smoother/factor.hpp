@@ -11,6 +11,13 @@
 /// The normal equations are J' diag(w) J d = -J' diag(w) e (IRLS: w is held fixed in the linear solve), and step control compares sum rho, the
 /// very function whose gradient is J' diag(w) e.
 ///
+/// A factor that has columns of zeros at the end of a variable's tangent space, whatever the values, may say so by a member template
+///
+///     template <class V> static constexpr int leading_axes()       axes of V before those
+///
+/// which keeps the others out of the fronts before the one that eliminates the variable: a landmark ties together the poses that see it, not their
+/// velocities and biases.
+///
 /// A plain struct models it: no base class, no virtual function. All members are const and touch nothing but their arguments.
 #pragma once
 
@@ -75,6 +82,17 @@ concept Factor = std::default_initializable<F> &&
                    f.linearise(detail::AnyValues{}, e, J);
                    { f.weigh(static_cast<const typename F::Scalar*>(e), w) } -> std::convertible_to<typename F::Scalar>;
                  };
+
+/// Axes of V that a factor may have non-zero columns for, counted from the first.
+template <class F, class V>
+[[nodiscard]] constexpr int leading_axes_of() {
+  if constexpr (requires { F::template leading_axes<V>(); }) {
+    static_assert(F::template leading_axes<V>() > 0 && F::template leading_axes<V>() <= V::dof, "leading_axes lies in 1..dof");
+    return F::template leading_axes<V>();
+  } else {
+    return V::dof;
+  }
+}
 
 /// Gaussian rows: every weight one, rho = |e|^2 / 2. For factors without a robust policy.
 template <class Scalar>

@@ -446,18 +446,21 @@ class FixedLagSmoother {
     auto& next = next_prior_;
     next.variables.clear();
     next.dimension = 0;
-    const auto append = [&](int id) {
-      if (next.dimension + window_.info(id).dof > EliminationType::kMaxFront) return false;
+    const auto append = [&](int id, int axes) {
+      if (next.dimension + axes > EliminationType::kMaxFront) return false;
       row_[static_cast<std::size_t>(id)] = next.dimension;
-      next.dimension += window_.info(id).dof;
+      axes_[static_cast<std::size_t>(id)] = axes;
+      next.dimension += axes;
       return next.variables.push_back(id);
     };
-    for (int k = front.eliminated; k < front.eliminated + front.separated; ++k)
-      if (!append(elimination_.member(front.first + k))) return failure(StatusCode::capacity_exceeded, "the prior has more axes than Problem::max_front_dimension");
+    const auto known_axes = [&](int id) { return join ? window_.info(id).prior_axes : 0; };
+    const int first = front.first + front.eliminated, end = first + front.separated;
+    for (int k = first; k < end; ++k)
+      if (const int id = elimination_.member(k); !append(id, std::max(elimination_.axes(k), known_axes(id)))) return failure(StatusCode::capacity_exceeded, "the prior has more axes than Problem::max_front_dimension");
     if (join)
       for (int id : prior_.variables) {
         const bool known = std::find(next.variables.begin(), next.variables.end(), id) != next.variables.end();
-        if (!known && !append(id)) return failure(StatusCode::capacity_exceeded, "the prior has more axes than Problem::max_front_dimension");
+        if (!known && !append(id, known_axes(id))) return failure(StatusCode::capacity_exceeded, "the prior has more axes than Problem::max_front_dimension");
       }
     const std::size_t n = static_cast<std::size_t>(next.dimension);
     std::fill_n(next.H.begin(), n * n, Scalar(0));
@@ -466,21 +469,25 @@ class FixedLagSmoother {
     const Scalar* const U = elimination_.update_of(0);
     const Scalar* const reference = elimination_.reference_of(0);
     const int m = front.rows_s;
+    int rows = 0;  // of the update matrix; they keep their order in the prior
+    for (int k = first; k < end; ++k)
+      for (int i = 0; i < elimination_.axes(k); ++i) to_row_[static_cast<std::size_t>(rows++)] = row_[static_cast<std::size_t>(elimination_.member(k))] + i;
     for (int j = 0; j < m; ++j) {
-      for (int i = j; i < m; ++i) next.h(i, j) = U[static_cast<std::ptrdiff_t>(j) * (m + 1) + i];
-      next.g[static_cast<std::size_t>(j)] = U[static_cast<std::ptrdiff_t>(j) * (m + 1) + m];
-      next.reference[static_cast<std::size_t>(j)] = reference[j];
+      const int to = to_row_[static_cast<std::size_t>(j)];
+      for (int i = j; i < m; ++i) next.h(to_row_[static_cast<std::size_t>(i)], to) = U[static_cast<std::ptrdiff_t>(j) * (m + 1) + i];
+      next.g[static_cast<std::size_t>(to)] = U[static_cast<std::ptrdiff_t>(j) * (m + 1) + m];
+      next.reference[static_cast<std::size_t>(to)] = reference[j];
     }
     next.c = 0;  // counted from the expansion point: the sum of all past costs would swamp the differences that step control compares
     if (join) {
       prior_.move_to_theta(window_);
       for (int a : prior_.variables)
-        for (int i = 0; i < window_.info(a).dof; ++i) {
+        for (int i = 0; i < window_.info(a).prior_axes; ++i) {
           const int from = window_.info(a).prior + i, to = row_[static_cast<std::size_t>(a)] + i;
           next.g[static_cast<std::size_t>(to)] += prior_.g[static_cast<std::size_t>(from)];
           next.reference[static_cast<std::size_t>(to)] += prior_.reference[static_cast<std::size_t>(from)];
           for (int b : prior_.variables)
-            for (int j = 0; j < window_.info(b).dof; ++j) {
+            for (int j = 0; j < window_.info(b).prior_axes; ++j) {
               const int from_b = window_.info(b).prior + j, to_b = row_[static_cast<std::size_t>(b)] + j;
               if (to >= to_b) next.h(to, to_b) += prior_.h(std::max(from, from_b), std::min(from, from_b));
             }
@@ -525,7 +532,8 @@ class FixedLagSmoother {
     int row = 0;
     for (int id : prior_.variables) {
       window_.info(id).prior = row;
-      row += window_.info(id).dof;
+      window_.info(id).prior_axes = axes_[static_cast<std::size_t>(id)];
+      row += window_.info(id).prior_axes;
       window_.assign(id, Which::prior, Which::theta);
     }
     elimination_.drop_first_front();
@@ -554,7 +562,8 @@ class FixedLagSmoother {
   EliminationType elimination_{};
   typename EliminationType::Prior prior_{}, next_prior_{};
   Covariance<EliminationType> covariance_{};
-  std::array<int, static_cast<std::size_t>(WindowType::VariableTypes::total)> ids_{}, row_{};
+  std::array<int, static_cast<std::size_t>(WindowType::VariableTypes::total)> ids_{}, row_{}, axes_{};
+  std::array<int, static_cast<std::size_t>(EliminationType::kMaxFront)> to_row_{};
   bool changed_{true};
   bool damped_{false};  ///< the stored fronts contain damping
 };

@@ -7,6 +7,9 @@
 /// among all its factors. The separator S_f is everything else that the front's factors and its children's update matrices touch; the children of a
 /// front are those whose separator begins there.
 ///
+/// Of a separator's variable the leading axes alone are members that anything of the front touches (leading_axes of the factors): a landmark seen from
+/// ten states couples their poses, 6 axes of 15 each, and the front's cost goes with the square of its axes.
+///
 /// A front is known by a hash of E, S and its factors: while that stays, and those before it stay, its numbers may be used again.
 #pragma once
 
@@ -71,6 +74,8 @@ class FrontTree {
   [[nodiscard]] Front& front(int f) { return fronts_[at(f)]; }
   [[nodiscard]] const Front& front(int f) const { return fronts_[at(f)]; }
   [[nodiscard]] int member(int i) const { return members_[at(i)]; }
+  /// Leading axes of member i that are rows of its front: all of an eliminated variable's.
+  [[nodiscard]] int axes(int i) const { return axes_[at(i)]; }
   [[nodiscard]] int tangent_size() const { return tangent_size_; }
   /// The front that sums the marginal prior, -1: there is none.
   [[nodiscard]] int prior_front() const { return prior_front_; }
@@ -187,11 +192,12 @@ class FrontTree {
       for (int c = 0; fits && c < f; ++c) {
         const Front& child = fronts_[at(c)];
         if (child.parent != f) continue;
-        for (int k = child.eliminated; k < child.eliminated + child.separated; ++k) fits = fits && take(tables, f, members_[at(child.first + k)]);
+        for (int k = child.eliminated; k < child.eliminated + child.separated; ++k) fits = fits && take(tables, f, members_[at(child.first + k)], axes(child.first + k));
       }
       if (f == prior_front_)
-        for (int id : prior_variables) fits = fits && take(tables, f, id);
+        for (int id : prior_variables) fits = fits && take(tables, f, id, tables.variable(id).prior_axes);
       if (!fits) return false;
+      close_separator(tables, front);
     }
     return true;
   }
@@ -205,7 +211,8 @@ class FrontTree {
     if (used_ == MemberCapacity) return false;
     Front& front = fronts_[at(f)];
     VariableInfo& v = tables.variable(id);
-    members_[at(used_++)] = id;
+    members_[at(used_)] = id;
+    axes_[at(used_++)] = v.dof;
     v.offset = tangent_size_;
     tangent_size_ += v.dof;
     front.rows_e += v.dof;
@@ -219,23 +226,37 @@ class FrontTree {
     for (int id = first; id >= 0; id = tables.factor(id).next) {
       const FactorInfo& factor = tables.factor(id);
       for (int k = 0; k < factor.keys; ++k)
-        if (!take(tables, f, tables.variables_of(factor)[k])) return false;
+        if (!take(tables, f, tables.variables_of(factor)[k], tables.axes_of(factor)[k])) return false;
       mix(fronts_[at(f)].shape, static_cast<std::uint64_t>(id) + 0x10000U);
     }
     return true;
   }
-  [[nodiscard]] bool take(TablesType& tables, int f, int id) {
+  /// Takes the leading axes of a variable into the separator of front f.
+  [[nodiscard]] bool take(TablesType& tables, int f, int id, int axes) {
     VariableInfo& v = tables.variable(id);
-    if (v.role == Role::local || v.front == f || v.position == f + 1) return true;
-    if (used_ == MemberCapacity) return false;
+    if (v.role == Role::local || v.front == f) return true;
     Front& front = fronts_[at(f)];
-    v.position = f + 1;  // a mark while listing: already in the separator of front f
-    members_[at(used_++)] = id;
+    const int first = front.first + front.eliminated;
+    if (v.position >= first && v.position < used_ && members_[at(v.position)] == id) {  // it is there already
+      axes_[at(v.position)] = std::max(axes_[at(v.position)], axes);
+      return true;
+    }
+    if (used_ == MemberCapacity) return false;
+    v.position = used_;
+    members_[at(used_)] = id;
+    axes_[at(used_++)] = axes;
     ++front.separated;
-    front.rows_s += v.dof;
     if (front.parent < 0 || v.front < front.parent) front.parent = v.front;
-    mix(front.shape, static_cast<std::uint64_t>(id) << 32 | v.generation);
     return true;
+  }
+
+  /// Counts the axes of a separator that is complete.
+  void close_separator(const TablesType& tables, Front& front) {
+    for (int k = front.first + front.eliminated; k < used_; ++k) {
+      front.rows_s += axes(k);
+      mix(front.shape, static_cast<std::uint64_t>(members_[at(k)]) << 32 | tables.variable(members_[at(k)]).generation);
+      mix(front.shape, static_cast<std::uint64_t>(axes(k)));
+    }
   }
 
   static void mix(std::uint64_t& hash, std::uint64_t value) {  // FNV-1a on 64-bit words
@@ -244,7 +265,7 @@ class FrontTree {
   }
 
   std::array<Front, static_cast<std::size_t>(kStates)> fronts_{};
-  std::array<int, static_cast<std::size_t>(MemberCapacity)> members_{};
+  std::array<int, static_cast<std::size_t>(MemberCapacity)> members_{}, axes_{};
   std::array<int, static_cast<std::size_t>(kStates)> first_chain_{}, last_chain_{};
   std::array<std::uint64_t, static_cast<std::size_t>(kStates)> shape_before_{};
   std::array<bool, static_cast<std::size_t>(kStates)> clean_before_{};

@@ -40,7 +40,7 @@ struct MarginalPrior {
   template <class WindowType>
   Scalar evaluate(WindowType& window, Which which) {
     if (empty()) return 0;
-    for (int id : variables) window.local(id, Which::prior, which, d.data() + window.info(id).prior);
+    for (int id : variables) window.local(id, Which::prior, which, window.info(id).prior_axes, d.data() + window.info(id).prior);
     return cost_at_d();
   }
 

@@ -38,9 +38,10 @@ struct VariableInfo {
   int tangent{0};        ///< first element in the tangent tables
   int degree{0};         ///< factors that touch it
   int front{-1};         ///< front that eliminates it
-  int position{-1};      ///< column in the front under assembly
+  int position{-1};      ///< column in the front under assembly; while fronts are listed, its place in the members
   int offset{-1};        ///< first element in the stacked step vector
   int prior{-1};         ///< first row in the marginal prior, -1: not in it
+  int prior_axes{0};     ///< leading axes that the marginal prior knows
   int first_factor{-1};  ///< of a local variable: its factors
   int next{-1};          ///< next variable of the same front's list
 };
@@ -149,6 +150,8 @@ struct Tables {
 
   /// Global indices of a factor's variables, f.keys of them, in the order of for_each_key.
   [[nodiscard]] const int* variables_of(const FactorInfo& f) const { return keys.data() + f.first_key; }
+  /// How many leading axes of each of them the factor touches.
+  [[nodiscard]] const int* axes_of(const FactorInfo& f) const { return axes.data() + f.first_key; }
   /// Column c of a factor's Jacobian, f.rows scalars.
   [[nodiscard]] const Scalar* jacobian_column(const FactorInfo& f, int c) const {
     return jacobian.data() + f.first_jacobian + static_cast<std::ptrdiff_t>(c) * f.rows;
@@ -184,7 +187,7 @@ struct Tables {
   Array<Scalar, S.factors> cost{};             ///< rho(e)
   Array<Scalar, S.jacobian> jacobian{};        ///< at theta
   Array<RowSpan, S.columns> spans{};           ///< of the Jacobian's columns
-  Array<int, S.keys> keys{};
+  Array<int, S.keys> keys{}, axes{};           ///< of all factors: variables, and how many of their leading axes each touches
   Array<bool, S.factor_types> type_enabled = [] {
     Array<bool, S.factor_types> all{};
     all.fill(true);

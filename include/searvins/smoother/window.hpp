@@ -128,11 +128,11 @@ class Window {
     static_assert(F::max_rows <= std::numeric_limits<std::int16_t>::max(), "a RowSpan counts rows in 16 bits");
     FactorInfo fresh;
     fresh.type = type;
-    std::array<int, static_cast<std::size_t>(F::max_keys)> ids{};
-    if (const Status s = bind(factor, ids.data(), fresh); !s.ok()) return s;
+    std::array<int, static_cast<std::size_t>(F::max_keys)> ids{}, axes{};
+    if (const Status s = bind(factor, ids.data(), axes.data(), fresh); !s.ok()) return s;
     const auto inserted = factor_pool<F>().insert(factor);
     if (!inserted.ok()) return failure(StatusCode::capacity_exceeded, "the pool of this factor type is full: raise its capacity in Problem::Factors", type);
-    enter<F>(static_cast<int>(inserted->slot), ids.data(), fresh);
+    enter<F>(static_cast<int>(inserted->slot), ids.data(), axes.data(), fresh);
     return Key<F>{inserted->slot, inserted->generation};
   }
 
@@ -220,9 +220,12 @@ class Window {
     const Scalar* const step = tables.candidate_delta.data() + info(id).tangent;
     visit_variable(id, [step]<class V>(VariableRecord<V>& r) { r[Which::candidate] = r[Which::theta].retract(Eigen::Map<const Tangent<V>>(step)); });
   }
-  /// out <- value `to` (-) value `from`, dof scalars
-  void local(int id, Which from, Which to, Scalar* out) {
-    visit_variable(id, [&]<class V>(VariableRecord<V>& r) { Eigen::Map<Tangent<V>>{out} = r[from].local(r[to]); });
+  /// out <- the first `axes` scalars of  value `to` (-) value `from`
+  void local(int id, Which from, Which to, int axes, Scalar* out) {
+    visit_variable(id, [&]<class V>(VariableRecord<V>& r) {
+      const Tangent<V> d = r[from].local(r[to]);
+      std::copy_n(d.data(), axes, out);
+    });
   }
   [[nodiscard]] const char* variable_name(int id) const {
     const char* name = "";
@@ -345,7 +348,7 @@ class Window {
 
   /// Writes a fresh factor into the tables.
   template <class F>
-  void enter(int slot, const int* ids, FactorInfo& fresh) {
+  void enter(int slot, const int* ids, const int* axes, FactorInfo& fresh) {
     constexpr int type = FactorTypes::template index_of<F>();
     const int id = FactorTypes::offset_of(type) + slot;
     fresh.first_key = kFactorOffset<F, 0> + slot * F::max_keys;
@@ -354,14 +357,15 @@ class Window {
     fresh.first_jacobian = kFactorOffset<F, 3> + slot * F::max_rows * F::max_columns;
     tables.factor(id) = fresh;
     std::copy_n(ids, fresh.keys, tables.keys.data() + fresh.first_key);
+    std::copy_n(axes, fresh.keys, tables.axes.data() + fresh.first_key);
     for (auto* rows : {&tables.e_theta, &tables.weights, &tables.e, &tables.weights_now}) std::fill_n(rows->data() + fresh.first_row, F::max_rows, Scalar(0));
     for (int k = 0; k < fresh.keys; ++k) ++info(ids[k]).degree;
     tables.living_factors.insert(id);
   }
 
-  /// Resolves a factor's keys to global indices and counts its columns.
+  /// Resolves a factor's keys to global indices, with the leading axes that it touches, and counts its columns.
   template <class F>
-  Status bind(const F& factor, int* ids, FactorInfo& f) const {
+  Status bind(const F& factor, int* ids, int* axes, FactorInfo& f) const {
     Status status = ok_status();
     int locals = 0;
     factor.for_each_key([&]<class V>(const Key<V>& key) {
@@ -374,6 +378,7 @@ class Window {
       }
       if (std::find(ids, ids + f.keys, id) != ids + f.keys) status = failure(StatusCode::invalid_argument, "the factor names a variable twice", f.keys);
       locals += V::role == Role::local ? 1 : 0;
+      axes[f.keys] = leading_axes_of<F, V>();
       ids[f.keys++] = id;
       f.columns += V::dof;
     });

@@ -32,6 +32,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include <searvins/core/status.hpp>
 #include <searvins/imu/imu_factor.hpp>
@@ -54,6 +55,11 @@ struct StereoFactor {
   using State = imu::NavigationState;
   static constexpr int max_rows = 3, max_keys = 2, max_columns = State::dof + Landmark::dof;
   static constexpr const char* name = "stereo";
+  /// Attitude and position of the state, all of the landmark.
+  template <class V>
+  static constexpr int leading_axes() {
+    return std::is_same_v<V, State> ? 6 : V::dof;
+  }
   static constexpr double kGrossSigmas = 10;  ///< of disparity: see the file comment
 
   smoother::Key<State> state{};
