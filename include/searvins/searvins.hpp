@@ -18,6 +18,7 @@
 #include <searvins/core/status.hpp>
 #include <searvins/core/time.hpp>
 
+#include <searvins/estimator/camera_predictor.hpp>
 #include <searvins/estimator/estimator.hpp>
 #include <searvins/estimator/free_motion.hpp>
 #include <searvins/estimator/inertial_motion.hpp>
