@@ -108,6 +108,22 @@ TEST_CASE("a full table refuses new tracks and follows the ones it has") {
   CHECK(std::is_sorted(table.begin(), table.end(), [](const Track& a, const Track& b) { return a.id < b.id; }));
 }
 
+TEST_CASE("a full table makes room for what is seen by forgetting what has been away for longest") {
+  TrackTable<3> table;
+  table.begin_frame();
+  for (const std::uint64_t id : {30U, 10U, 20U}) (void)table.observe(id, kPixel);
+  table.begin_frame();
+  (void)table.observe(10, kPixel), (void)table.observe(30, kPixel);
+  table.begin_frame();
+  (void)table.observe(30, kPixel);
+  CHECK(table.observe(40, kPixel) != nullptr);  // 20 goes
+  CHECK((table.find(20) == nullptr && table.find(10) != nullptr && table.find(30) != nullptr));
+  CHECK(table.observe(5, kPixel) != nullptr);  // 10 goes
+  CHECK(table.find(10) == nullptr);
+  CHECK(table.observe(6, kPixel) == nullptr);
+  CHECK(std::is_sorted(table.begin(), table.end(), [](const Track& a, const Track& b) { return a.id < b.id; }));
+}
+
 TEST_CASE("a landmark that the estimator gave up is followed by another one; cleared tables do not repeat numbers") {
   TrackOptions options;
   options.n_min = 1;

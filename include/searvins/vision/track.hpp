@@ -79,7 +79,8 @@ class TrackTable {
     (void)tracks_.erase_if([&](const Track& t) { return t.last_frame + patience < frame_; });
   }
 
-  /// Counts an observation of this frame. Returns the track as it is now; nullptr when it is new and there is no room for it.
+  /// Counts an observation of this frame. Returns the track as it is now; nullptr when it is new and
+  /// there is no room for it: a full table forgets those that have been away for longest, but none that this frame has seen.
   const Track* observe(std::uint64_t id, const StereoPixel<double>& pixel_px) {
     Track* const track = find_or_insert(id);
     if (!track) return nullptr;
@@ -156,12 +157,21 @@ class TrackTable {
   }
   [[nodiscard]] Track* find_track(std::uint64_t id) { return find_in(tracks_, id); }
   [[nodiscard]] Track* find_or_insert(std::uint64_t id) {
-    Track* const at = lower_bound(tracks_, id);
+    Track* at = lower_bound(tracks_, id);
     if (at != tracks_.end() && at->id == id) return at;
+    if (tracks_.full() && forget_longest_away()) at = lower_bound(tracks_, id);
     const auto index = static_cast<std::size_t>(at - tracks_.begin());
     Track track;
     track.id = id;
     return tracks_.insert(index, track) ? &tracks_[index] : nullptr;
+  }
+
+  /// Makes room: what is seen now goes before what may come back. False when all were seen in this frame.
+  bool forget_longest_away() {
+    const auto oldest = std::min_element(tracks_.begin(), tracks_.end(), [](const Track& a, const Track& b) { return a.last_frame < b.last_frame; });
+    if (oldest->last_frame >= frame_) return false;
+    tracks_.erase(static_cast<std::size_t>(oldest - tracks_.begin()));
+    return true;
   }
 
   TrackOptions options_;
