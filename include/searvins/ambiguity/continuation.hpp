@@ -42,6 +42,7 @@ struct ArcId {
 template <class Handle, std::size_t MaxArcs>
 class Continuation {
  public:
+  /// One arc: which state the phases of an identity share, and how long it has been in use.
   struct Arc {
     ArcId id{};
     gnss::SatelliteId pivot{};    ///< of double-difference states; number 0 otherwise

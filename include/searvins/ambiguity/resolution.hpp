@@ -47,6 +47,7 @@
 
 namespace searvins::ambiguity {
 
+/// What to do when not all ambiguities can be resolved.
 enum class ResolutionMode : std::uint8_t {
   full,     ///< all or nothing, as in the paper
   partial,  ///< a subset when the whole does not pass
@@ -67,6 +68,7 @@ enum class ResolutionVerdict : std::uint8_t {
   contradiction     ///< the re-optimised window refused the integers (set by the estimator)
 };
 
+/// Name of a verdict, for reports.
 [[nodiscard]] constexpr const char* name_of(ResolutionVerdict v) {
   constexpr const char* names[] = {"accepted", "off", "too few", "ill-conditioned", "success rate", "norm", "ratio", "covariance", "innovation", "contradiction"};
   return names[static_cast<std::size_t>(v)];
@@ -114,6 +116,7 @@ struct ResolutionOutcome {
   [[nodiscard]] bool accepted() const { return verdict == ResolutionVerdict::accepted; }
 };
 
+/// Search and gates of the file comment, for up to MaxN ambiguities. All memory is in the object.
 template <int MaxN>
 class Resolver {
  public:

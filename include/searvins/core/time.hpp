@@ -16,10 +16,10 @@
 
 namespace searvins {
 
-inline constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
-inline constexpr std::int64_t kSecondsPerDay = 86'400;
-inline constexpr std::int64_t kSecondsPerWeek = 604'800;
-inline constexpr std::int64_t kNanosecondsPerWeek = kSecondsPerWeek * kNanosecondsPerSecond;
+inline constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;  ///< exact
+inline constexpr std::int64_t kSecondsPerDay = 86'400;  ///< of GPS time, which has no leap seconds
+inline constexpr std::int64_t kSecondsPerWeek = 604'800;  ///< of GPS time
+inline constexpr std::int64_t kNanosecondsPerWeek = kSecondsPerWeek * kNanosecondsPerSecond;  ///< of GPS time
 
 /// Nearest integer number of nanoseconds (halves up). Seconds beyond +-4.6e9 (145 years) saturate and NaN gives 0, so that garbage is no
 /// undefined behaviour, not even when added to an instant; a reader refuses non-finite numbers before they become a time.
@@ -81,11 +81,15 @@ inline constexpr std::int64_t kGalileoWeekOffset = 1024;  ///< GPS week of GST w
 inline constexpr std::int64_t kBeidouWeekOffset = 1356;   ///< GPS week of BDT week 0
 inline constexpr std::int64_t kBeidouLagSeconds = 14;     ///< GPST - BDT
 
+/// GPS time of an instant of Galileo system time, exact.
 [[nodiscard]] constexpr GpsTime to_gps(GalileoTime t) { return {t.ns + kGalileoWeekOffset * kNanosecondsPerWeek}; }
+/// GPS time of an instant of BeiDou time, exact.
 [[nodiscard]] constexpr GpsTime to_gps(BeidouTime t) {
   return {t.ns + kBeidouWeekOffset * kNanosecondsPerWeek + kBeidouLagSeconds * kNanosecondsPerSecond};
 }
+/// Galileo system time of an instant of GPS time, exact.
 [[nodiscard]] constexpr GalileoTime to_galileo(GpsTime t) { return {t.ns - kGalileoWeekOffset * kNanosecondsPerWeek}; }
+/// BeiDou time of an instant of GPS time, exact.
 [[nodiscard]] constexpr BeidouTime to_beidou(GpsTime t) {
   return {t.ns - kBeidouWeekOffset * kNanosecondsPerWeek - kBeidouLagSeconds * kNanosecondsPerSecond};
 }
@@ -107,7 +111,7 @@ struct CivilTime {
   return era * 146097 + day_of_era - 719468;
 }
 
-inline constexpr std::int64_t kGpsEpochUnixDays = days_from_civil(1980, 1, 6);
+inline constexpr std::int64_t kGpsEpochUnixDays = days_from_civil(1980, 1, 6);  ///< from 1970-01-01 to the origin of GPS time
 
 /// A civil reading of a clock that shows GPS time (RINEX observation tags).
 [[nodiscard]] inline GpsTime gps_from_civil(const CivilTime& c) {
@@ -169,6 +173,7 @@ struct UtcTime {
   std::int64_t unix_ns{0};
 };
 
+/// UTC of an instant of GPS time, by the table of leap seconds.
 [[nodiscard]] constexpr UtcTime to_utc(GpsTime t) {
   return {t.ns - leap_seconds(t) * kNanosecondsPerSecond + kGpsEpochUnixDays * kSecondsPerDay * kNanosecondsPerSecond};
 }

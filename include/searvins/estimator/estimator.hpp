@@ -53,6 +53,7 @@ struct BasicEstimatorOptions {
   double realign_within_s{30};
 };
 
+/// Settings of an estimator without a camera.
 using EstimatorOptions = BasicEstimatorOptions<InertialOptions>;
 
 /// When the next of a stream that comes at even intervals is due.
@@ -85,6 +86,7 @@ template <class C>
 struct WithoutCamera {
   using type = C;
 };
+/// A capacity that names its part without a camera.
 template <class C>
   requires requires { typename C::WithoutCamera; }
 struct WithoutCamera<C> {

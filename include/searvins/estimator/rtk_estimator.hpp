@@ -43,6 +43,7 @@
 
 namespace searvins::estimator {
 
+/// See the file comment. `Config` is an RtkConfig, or a struct with the same members.
 template <class Config>
 class RtkEstimator {
  public:

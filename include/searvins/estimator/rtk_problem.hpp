@@ -22,6 +22,7 @@ struct RtkConfig {
   using DopplerForm = Form<robust::Huber<double>>;
 };
 
+/// The Problem of FixedLagSmoother for a configuration.
 template <class Config>
 struct RtkProblem {
   using Cap = typename Config::Capacity;

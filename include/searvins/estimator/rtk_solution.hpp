@@ -24,6 +24,7 @@ enum class SolutionStatus : std::uint8_t {
   dr      ///< prediction, no GNSS used
 };
 
+/// The word for a status in files and tables.
 [[nodiscard]] constexpr const char* name_of(SolutionStatus s) {
   constexpr const char* names[] = {"fix", "float", "dgnss", "spp", "dr"};
   return names[static_cast<std::size_t>(s)];

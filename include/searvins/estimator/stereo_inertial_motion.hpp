@@ -63,6 +63,7 @@ struct StereoOptions {
   double landmark_confidence{0.999};  ///< of the chi-square look at a landmark that leaves
 };
 
+/// Settings of the inertial part and of the camera's.
 struct StereoInertialOptions : InertialOptions {
   StereoOptions stereo{};
 };

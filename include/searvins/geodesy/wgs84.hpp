@@ -15,9 +15,9 @@
 
 namespace searvins::geodesy {
 
-inline constexpr double kSemiMajorAxisM = 6378137.0;
-inline constexpr double kFlattening = 1.0 / 298.257223563;
-inline constexpr double kEccentricitySquared = kFlattening * (2.0 - kFlattening);
+inline constexpr double kSemiMajorAxisM = 6378137.0;  ///< a of the ellipsoid, m
+inline constexpr double kFlattening = 1.0 / 298.257223563;  ///< f of the ellipsoid
+inline constexpr double kEccentricitySquared = kFlattening * (2.0 - kFlattening);  ///< e^2 of the ellipsoid
 inline constexpr double kEarthRateRadps = 7.2921151467e-5;  ///< rotation of the Earth, IS-GPS-200
 
 /// Geodetic coordinates: latitude and longitude in radians, height above the ellipsoid in metres.

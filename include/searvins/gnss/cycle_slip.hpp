@@ -43,7 +43,7 @@ enum class SlipCause : std::uint8_t {
   power_failure,      ///< a receiver reported a power failure
   base_changed,       ///< another base signal or another base position than before
 };
-inline constexpr std::size_t kSlipCauses = 12;
+inline constexpr std::size_t kSlipCauses = 12;  ///< number of SlipCause values
 
 /// Name of a cause, for reports.
 [[nodiscard]] constexpr const char* name_of(SlipCause cause) {
@@ -84,10 +84,11 @@ struct CycleSlipOptions {
   double longest_interval_s{60};  ///< no continuity across more than this
 };
 
+/// Signals of one satellite that geometry_free_check() looks at.
+inline constexpr std::size_t kMaxGeometryFree = 16;
 /// Geometry-free test of one satellite: `change_m[i]` is the change of the phase of its signal i (NaN: none), on distinct carriers.
 /// A signal passes when it belongs to the largest set that agrees within the threshold and that set is a majority (of two signals: both),
-/// fails otherwise; unavailable when it has no partner. At most kMaxGeometryFree signals are looked at.
-inline constexpr std::size_t kMaxGeometryFree = 16;
+/// fails otherwise; unavailable when it has no partner.
 inline void geometry_free_check(std::span<const double> change_m, double threshold_m, std::span<CheckResult> results) {
   const std::size_t n = std::min({change_m.size(), results.size(), kMaxGeometryFree});
   const auto agree = [&](std::size_t i, std::size_t j) { return std::abs(change_m[i] - change_m[j]) < threshold_m; };

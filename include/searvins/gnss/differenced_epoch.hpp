@@ -28,8 +28,8 @@
 
 namespace searvins::gnss {
 
-inline constexpr std::size_t kMaxCorrectedSignals = 160;
-inline constexpr std::size_t kMaxRejectedSignals = 256;
+inline constexpr std::size_t kMaxCorrectedSignals = 160;  ///< base-corrected signals of one epoch
+inline constexpr std::size_t kMaxRejectedSignals = 256;  ///< rejections of one epoch that are remembered one by one
 
 /// Why an observation was not used, or only its code.
 enum class Rejection : std::uint8_t {
@@ -46,7 +46,7 @@ enum class Rejection : std::uint8_t {
   duplicate,        ///< the satellite stands twice in the epoch; neither copy is used
   capacity,         ///< more signals than fit: those of the lowest satellites go
 };
-inline constexpr std::size_t kRejections = 12;
+inline constexpr std::size_t kRejections = 12;  ///< number of Rejection values
 
 /// Name of a rejection, for reports.
 [[nodiscard]] constexpr const char* name_of(Rejection r) {

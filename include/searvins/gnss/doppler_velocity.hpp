@@ -62,7 +62,7 @@ struct DopplerRow {
   Eigen::Vector4d direction{Eigen::Vector4d::Zero()};  ///< d rate / d (velocity, drift)
 };
 
-inline constexpr std::size_t kMaxDopplerRows = 2 * kMaxSatellitesPerEpoch;
+inline constexpr std::size_t kMaxDopplerRows = 2 * kMaxSatellitesPerEpoch;  ///< Dopplers of one solution
 
 /// Velocity and drift of one epoch.
 struct DopplerVelocity {

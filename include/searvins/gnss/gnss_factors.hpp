@@ -235,8 +235,11 @@ struct AmbiguityFactor {
   double weigh(const double* e, double* w) const { return smoother::weigh_gaussian(e, 1, w); }
 };
 
+/// Weak prior of a fresh ambiguity: (a - mean) / sigma.
 using AmbiguityDatum = AmbiguityFactor<AmbiguityConstraint::datum>;
+/// Random walk from one arc of a satellite to the next: (a - b) / sigma.
 using AmbiguityWalk = AmbiguityFactor<AmbiguityConstraint::continuity>;
+/// An accepted integer: (a - b - mean) / sigma with a tight sigma.
 using IntegerFix = AmbiguityFactor<AmbiguityConstraint::integer>;
 static_assert(smoother::Factor<AmbiguityDatum> && smoother::Factor<IntegerFix>);
 

@@ -20,9 +20,9 @@
 
 namespace searvins::gnss {
 
-inline constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-inline constexpr std::size_t kMaxSignalsPerSatellite = 8;
-inline constexpr std::size_t kMaxSatellitesPerEpoch = 64;
+inline constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();  ///< a measurement that is not there
+inline constexpr std::size_t kMaxSignalsPerSatellite = 8;  ///< of one satellite at one epoch
+inline constexpr std::size_t kMaxSatellitesPerEpoch = 64;  ///< of one receiver at one epoch
 
 /// One tracked signal of one satellite.
 struct SignalObservation {

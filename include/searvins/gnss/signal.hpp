@@ -9,11 +9,11 @@
 
 namespace searvins::gnss {
 
-inline constexpr double kSpeedOfLightMps = 299'792'458.0;
+inline constexpr double kSpeedOfLightMps = 299'792'458.0;  ///< in vacuum, exact
 
 /// The constellations that the library models. GLONASS (FDMA), SBAS and NavIC are skipped by the readers and counted.
 enum class Constellation : std::uint8_t { gps, galileo, beidou, qzss };
-inline constexpr std::size_t kConstellations = 4;
+inline constexpr std::size_t kConstellations = 4;  ///< number of Constellation values
 
 /// RINEX letter: G, E, C, J.
 [[nodiscard]] constexpr char letter_of(Constellation c) { return "GECJ"[static_cast<std::size_t>(c)]; }
@@ -77,6 +77,7 @@ struct SignalCode {
     default: return 0;
   }
 }
+/// Carrier frequency of a signal, Hz; 0 for an unknown band.
 [[nodiscard]] constexpr double frequency_hz(const SignalCode& s) { return frequency_hz(s.constellation, s.band); }
 
 /// Wavelength, metres; 0 for an unknown band.

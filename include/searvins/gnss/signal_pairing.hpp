@@ -25,7 +25,7 @@
 
 namespace searvins::gnss {
 
-inline constexpr std::size_t kMaxSignalGroups = 16;
+inline constexpr std::size_t kMaxSignalGroups = 16;  ///< pairs of rover and base signals in one epoch
 
 /// One group of double differences: a rover signal and the base signal that it is differenced against.
 struct SignalPair {

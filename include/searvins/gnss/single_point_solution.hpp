@@ -23,13 +23,14 @@
 
 namespace searvins::gnss {
 
-inline constexpr int kSinglePointClocks = static_cast<int>(kConstellations);
-inline constexpr int kSinglePointUnknowns = 3 + kSinglePointClocks + 1;
+inline constexpr int kSinglePointClocks = static_cast<int>(kConstellations);  ///< one a constellation
+inline constexpr int kSinglePointUnknowns = 3 + kSinglePointClocks + 1;  ///< position, clocks, delay of the other carriers
 inline constexpr std::size_t kCodesPerSatellite = 2;  ///< carriers of one satellite that a single-point solution can use
-inline constexpr std::size_t kMaxCodeRows = kCodesPerSatellite * kMaxSatellitesPerEpoch;
+inline constexpr std::size_t kMaxCodeRows = kCodesPerSatellite * kMaxSatellitesPerEpoch;  ///< codes of one solution
 
 /// Position (0..2), clocks of the constellations (3..6) and delay of the other carriers (7), all metres.
 using SinglePointVector = Eigen::Matrix<double, kSinglePointUnknowns, 1>;
+/// Covariance of a SinglePointVector, m^2.
 using SinglePointMatrix = Eigen::Matrix<double, kSinglePointUnknowns, kSinglePointUnknowns>;
 
 /// What became of a satellite's code.

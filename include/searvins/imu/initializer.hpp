@@ -54,10 +54,12 @@ enum class AlignmentWait : std::uint8_t {
 /// Where the heading came from.
 enum class HeadingSource : std::uint8_t { none, given, velocity, displacement };
 
+/// Name of a state of the alignment, for reports.
 [[nodiscard]] constexpr const char* name_of(AlignmentState s) {
   constexpr const char* names[] = {"collecting", "levelled", "aligned"};
   return names[static_cast<int>(s)];
 }
+/// Name of a source of the heading, for reports.
 [[nodiscard]] constexpr const char* name_of(HeadingSource s) {
   constexpr const char* names[] = {"none", "given", "velocity", "displacement"};
   return names[static_cast<int>(s)];

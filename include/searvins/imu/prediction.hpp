@@ -27,6 +27,7 @@
 
 namespace searvins::imu {
 
+/// Covariance of a navigation state, in the order of its tangent vector.
 using NavigationCovariance = Eigen::Matrix<double, 15, 15>;
 
 /// The state at the end of a motion. The motion's first-order bias correction is applied for the biases of `x`.

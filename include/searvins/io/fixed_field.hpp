@@ -37,6 +37,7 @@ enum class FieldState : std::uint8_t { blank, number, malformed };
   return text;
 }
 
+/// Whether a character is one of 0..9, whatever the locale.
 [[nodiscard]] constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 /// An I field. `out` changes only for a number; at most nine digits.

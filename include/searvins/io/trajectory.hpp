@@ -37,7 +37,7 @@ enum class SolutionStatus : std::uint8_t {
   spp,     ///< single point
   dr,      ///< dead reckoning: no GNSS used
 };
-inline constexpr std::size_t kSolutionStatuses = 5;
+inline constexpr std::size_t kSolutionStatuses = 5;  ///< number of SolutionStatus values
 
 /// The word in the file.
 [[nodiscard]] constexpr const char* name_of(SolutionStatus status) {
@@ -54,7 +54,7 @@ inline constexpr std::size_t kSolutionStatuses = 5;
   return false;
 }
 
-inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();  ///< a number that a row does not have
 
 /// One state of a trajectory.
 struct TrajectoryRow {
@@ -86,6 +86,7 @@ struct TrajectoryRow {
   }
 };
 
+/// Names of the columns, in the order of the file.
 inline constexpr std::array<std::string_view, 26> kTrajectoryColumns = {
     "week",      "sow",       "ecef_x_m",    "ecef_y_m", "ecef_z_m", "status",   "sd_e_m",       "sd_n_m",    "sd_u_m",
     "cov_en_m2", "cov_eu_m2", "cov_nu_m2",   "lat_deg",  "lon_deg",  "height_m", "vel_e_mps",    "vel_n_mps", "vel_u_mps",

@@ -35,8 +35,10 @@
 
 namespace searvins::so3 {
 
+/// A vector of three scalars.
 template <class S>
 using Vector3 = Eigen::Matrix<S, 3, 1>;
+/// A 3 x 3 matrix.
 template <class S>
 using Matrix3 = Eigen::Matrix<S, 3, 3>;
 

@@ -16,6 +16,7 @@
 
 namespace searvins::smoother {
 
+/// See the file comment. Needs an elimination that is factored, without damping.
 template <class EliminationType>
 class Covariance {
  public:

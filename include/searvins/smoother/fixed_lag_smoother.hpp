@@ -38,6 +38,7 @@
 
 namespace searvins::smoother {
 
+/// See the file comment.
 template <class Problem>
 class FixedLagSmoother {
  public:

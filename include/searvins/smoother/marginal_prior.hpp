@@ -20,6 +20,7 @@
 
 namespace searvins::smoother {
 
+/// See the file comment. At most MaxDimension tangent axes of MaxVariables variables.
 template <class Scalar, int MaxDimension, int MaxVariables>
 struct MarginalPrior {
   int dimension{0};

@@ -45,7 +45,7 @@ template <class T, std::size_t N>
 struct PoolHolder {
   Pool<T, N> pool{};
 };
-/// One pool a type; pool_of<T>(pools) finds it.
+/// One pool a type; `pool_of<T>(pools)` finds it.
 template <template <class> class Record, class List>
 struct Pools;
 template <template <class> class Record, class... C>
@@ -60,7 +60,7 @@ template <class T, std::size_t N>
   return holder.pool;
 }
 
-/// fn.operator()<T>() for the type T at position `type` of the list.
+/// `fn.operator()<T>()` for the type T at position `type` of the list.
 template <class... C, class Fn>
 void with_type(Types<C...>, int type, const Fn& fn) {
   int i = 0;
@@ -71,6 +71,7 @@ template <class T>
 using Itself = T;
 }  // namespace detail
 
+/// See the file comment.
 template <class Problem>
 class Window {
  public:

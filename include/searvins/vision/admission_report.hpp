@@ -31,7 +31,7 @@ enum class ObservationFate : std::uint8_t {
   no_room,             ///< more tracks than the table holds
   capacity,            ///< did not fit into the frame (the lowest scores of more than it holds)
 };
-inline constexpr std::size_t kObservationFates = 18;
+inline constexpr std::size_t kObservationFates = 18;  ///< number of ObservationFate values
 
 /// Name of a fate, for tables.
 [[nodiscard]] constexpr const char* name_of(ObservationFate fate) {
@@ -56,7 +56,7 @@ enum class FrameFate : std::uint8_t {
   nothing_usable,  ///< all observations were refused, for several reasons: rejected
   out_of_order,    ///< not after the frame before: refused, nothing changed
 };
-inline constexpr std::size_t kFrameFates = 11;
+inline constexpr std::size_t kFrameFates = 11;  ///< number of FrameFate values
 
 /// Name of a fate, for tables.
 [[nodiscard]] constexpr const char* name_of(FrameFate fate) {

@@ -60,7 +60,7 @@ enum class ImageFate : std::uint8_t {
   featureless,      ///< black, overexposed or covered: a frame without observations
   frontend_failed,  ///< the frontend itself reported an error: refused
 };
-inline constexpr std::size_t kImageFates = 9;
+inline constexpr std::size_t kImageFates = 9;  ///< number of ImageFate values
 
 /// Name of a fate, for tables.
 [[nodiscard]] constexpr const char* name_of(ImageFate fate) {
