@@ -6,6 +6,8 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
+#include <cstddef>
 #include <memory>
 #include <optional>
 
@@ -61,18 +63,14 @@ class InertialRun final : public SolverRun {
   Status set_base_position(const Eigen::Vector3d& position_e_m) override { return estimator_.set_base_position(position_e_m); }
   Status add_base(const gnss::ObservationEpoch& epoch) override { return estimator_.add_base(epoch); }
   Status add_rover(const gnss::ObservationEpoch& epoch) override { return estimator_.add_rover(epoch); }
-  Status add_imu(const imu::ImuSample& sample) override {
-    const Status s = estimator_.add_imu(sample);
-    if (s.ok()) newest_ = sample.time;
-    return s;
-  }
+  Status add_imu(const imu::ImuSample& sample) override { return estimator_.add_imu(sample); }
   Status add_position(const imu::PositionFix& fix) override { return estimator_.add_position(fix); }
   Status add_stereo(const TrackFrame& frame) override { return estimator_.add_stereo(frame); }
   Status set_heading(double heading_rad, double sigma_rad) override { return estimator_.set_heading(heading_rad, sigma_rad); }
   void finish() override { estimator_.finish(); }
 
   Result<estimator::RtkSolution> next() override { return estimator_.next(); }
-  [[nodiscard]] Result<estimator::RtkSolution> predict() const override { return estimator_.predict(newest_); }
+  [[nodiscard]] Result<estimator::RtkSolution> predict(GpsTime time) const override { return estimator_.predict(time); }
 
   [[nodiscard]] const gnss::DifferencedEpoch* differenced() const override { return &estimator_.differenced(); }
   [[nodiscard]] const gnss::SinglePointSolution& single_point() const override { return estimator_.single_point(); }
@@ -86,6 +84,13 @@ class InertialRun final : public SolverRun {
     const auto& motion = estimator_.inertial().motion();
     return StereoReport{motion.counts(), motion.dropped_landmarks(), estimator_.refused_frames(), estimator_.frame_status().what};
   }
+  [[nodiscard]] std::optional<ScreenedFrame> screened() const override {
+    const auto& motion = estimator_.inertial().motion();
+    const auto& frames = motion.counts().frames;
+    if (std::all_of(frames.begin(), frames.end(), [](std::size_t n) { return n == 0; })) return std::nullopt;
+    const auto& frame = motion.admitted();
+    return ScreenedFrame{frame.time, {frame.fates.data(), frame.fates.size()}, frame.fate};
+  }
 
  private:
   using Whole = estimator::Estimator<Form, estimator::StereoCapacity, estimator::StereoInertialMotion<>>;
@@ -97,7 +102,6 @@ class InertialRun final : public SolverRun {
   }
 
   Whole estimator_;
-  GpsTime newest_{};  ///< time of the newest reading
 };
 
 /// The run that the options ask for.

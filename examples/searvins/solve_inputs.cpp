@@ -255,21 +255,50 @@ Failure take_unit(const SolveRequest& request, const Rig& rig, SolveInputs& in) 
   return {};
 }
 
-/// The camera of the rig, and how its tracks are screened.
-Failure take_camera(const SolveRequest& request, const Rig& rig, SolveInputs& in) {
-  if (request.tracks.empty()) return {};
+/// The rectified pair that the rig describes.
+Failure take_rig_camera(const SolveRequest& request, const Rig& rig, vision::StereoCamera<double>& c) {
   if (!rig.camera || !rig.camera->rectified)
     return io::Diagnostic{request.rig, 0, "has no section camera.rectified, which --tracks needs: tracks are pixels of the rectified pair",
                           "add it (fx_px, fy_px, cx_px, cy_px, baseline_m), with size_px, R_b_c, t_b_c_m and sigma_px beside it"};
-  estimator::StereoOptions& stereo = in.inertial->stereo;
-  vision::StereoCamera<double>& c = stereo.camera;
   const RigRectified& r = *rig.camera->rectified;
   c.fx_px = r.fx_px, c.fy_px = r.fy_px, c.cx_px = r.cx_px, c.cy_px = r.cy_px, c.baseline_m = r.baseline_m;
   c.width_px = static_cast<int>(rig.camera->size_px.x()), c.height_px = static_cast<int>(rig.camera->size_px.y());
   c.R_bc = rig.R_rfu_b * rig.camera->R_b_c, c.p_bc_m = rig.R_rfu_b * rig.camera->t_b_c_m;
   if (const Status s = vision::check(c); !s.ok()) return io::Diagnostic{request.rig, 0, s.what, "see section camera"};
-  vision::AdmissionOptions& a = stereo.admission;
-  a.pnp.sigma_px = rig.camera->sigma_px;
+  return {};
+}
+
+/// The rectified pair that the pictures' own calibration describes, whose T_BS is in the axes of --imu; their stamps are GPS or UTC nanoseconds,
+/// whichever lies in the time to solve.
+Failure take_picture_camera(const SolveRequest& request, const Rig& rig, SolveInputs& in) {
+  GpsTime first{}, last{};
+  for (const io::NanosecondScale scale : {io::NanosecondScale::gps, io::NanosecondScale::unix_utc}) {
+    in.image_options.nanoseconds = scale;
+    const auto images = ImageFrames::open(request.images, in.image_options);
+    if (!images) return images.error();
+    const std::vector<EurocPair>& pairs = (*images)->recording().pairs;
+    first = pairs.front().time, last = pairs.back().time;
+    if (first > in.end || last < in.start) continue;
+    vision::StereoCamera<double>& c = in.inertial->stereo.camera;
+    c = (*images)->camera();
+    c.R_bc = rig.R_rfu_b * c.R_bc, c.p_bc_m = rig.R_rfu_b * c.p_bc_m;
+    return {};
+  }
+  return io::Diagnostic{request.images, 0, "the pictures are not of the time to solve: UTC sow " + io::fixed_text(first.sow(), 1) + " .. " +
+                        io::fixed_text(last.sow(), 1) + " of GPS week " + std::to_string(first.week()),
+                        "stamps are nanoseconds of GPS time (since 1980) or UTC (since 1970)"};
+}
+
+/// The camera, and how what it sees is screened.
+Failure take_camera(const SolveRequest& request, const Rig& rig, SolveInputs& in) {
+  if (!request.has_camera()) return {};
+  if (!request.tracks.empty()) {
+    if (Failure f = take_rig_camera(request, rig, in.inertial->stereo.camera)) return f;
+  } else if (Failure f = take_picture_camera(request, rig, in)) {
+    return f;
+  }
+  vision::AdmissionOptions& a = in.inertial->stereo.admission;
+  if (rig.camera) a.pnp.sigma_px = rig.camera->sigma_px;
   if (rig.reject_classes) {
     a.semantic.dynamic = a.semantic.unstable = vision::ClassSet{};
     for (const int k : *rig.reject_classes) a.semantic.dynamic.insert(static_cast<vision::SemanticClass>(k));
@@ -280,6 +309,7 @@ Failure take_camera(const SolveRequest& request, const Rig& rig, SolveInputs& in
     if (part == "motion") a.use_motion = false;
     if (part == "maturity") a.use_maturity = false;
   }
+  in.image_options.semantic = a.semantic;
   return {};
 }
 

@@ -10,13 +10,15 @@
 #include <string>
 #include <vector>
 
+#include <searvins/estimator/camera_predictor.hpp>
 #include <searvins/geodesy/wgs84.hpp>
 #include <searvins/imu/attitude_angles.hpp>
 #include <searvins/io/rinex_observation.hpp>
 #include <searvins/io/text_fields.hpp>
 
-#include "examples/precomputed_frontend/track_reader.hpp"
 #include "examples/searvins/solve_job.hpp"
+#include "examples/searvins/track_frames.hpp"
+#include "examples/support/frame_strip.hpp"
 #include "examples/support/progress.hpp"
 
 namespace searvins::examples {
@@ -298,15 +300,18 @@ class Drain {
       add_count(out_.skipped, s.what);
   }
 
-  void take_due() {
+  /// `after` is called after every answer.
+  template <class After>
+  void take_due(const After& after) {
     for (;;) {
       const auto before = std::chrono::steady_clock::now();
       const Result<estimator::RtkSolution> solution = run_.next();
       const double solve_ms = milliseconds_since(before);
+      after();
       if (solution.ok()) {
         take(*solution, solve_ms);
       } else {
-        if (SolverRun::is_nothing_due(solution.status()) || waiting_.empty()) return;
+        if (estimator::is_nothing_due(solution.status()) || waiting_.empty()) return;
         add_count(out_.skipped, solution.status().what);
         watch_.take(run_, waiting_.front().tag);
         waiting_.pop_front();
@@ -315,8 +320,8 @@ class Drain {
     }
   }
 
-  void take_predicted() {
-    const Result<estimator::RtkSolution> predicted = run_.predict();
+  void take_predicted(GpsTime time) {
+    const Result<estimator::RtkSolution> predicted = run_.predict(time);
     if (!predicted.ok() || !predicted->position_e_m.allFinite()) return;
     out_.predicted_rows.push_back(row_of(*predicted, io::kUnknown));
     out_.predicted_rows.back().success_rate = io::kUnknown;  // that of the solution it goes on from
@@ -425,71 +430,90 @@ class MeasurementFeed {
   bool has_epoch_{false};
 };
 
-/// Frames of stereo tracks, one after the other.
-class TrackFeed {
+/// Hands frames over, from wherever they come.
+class FrameFeed {
  public:
-  /// Opens the file, if there is one, and reads the first frame of the time to solve.
-  io::FileResult<bool> open(const std::string& path, const SolveInputs& in) {
-    if (path.empty()) return true;
-    if (auto wrong = reader_.open(path, in.start.week())) return *wrong;
-    const io::FileResult<bool> read = advance();
-    if (!read) return read.error();
-    while (has_frame_ && frame_->time < in.start)
-      if (const io::FileResult<bool> more = advance(); !more) return more.error();
-    if (!has_frame_) return io::Diagnostic{path, 0, "has no frame in the time to solve", "stamps are GPS seconds of week of the rover's week"};
-    return true;
+  FrameFeed(const SolveInputs& in, SolverRun& run, SolveOutcome& out) : run_(run), out_(out), strip_(in.start, in.end) {
+    if (in.inertial) predictor_.emplace(in.inertial->stereo.camera, in.inertial->lever_arm_b_m);
   }
-  /// Hands over the frames up to a time. Errors: a row that cannot be read.
-  io::FileResult<bool> feed(GpsTime until, SolverRun& run, SolveOutcome& out) {
-    while (has_frame_ && frame_->time <= until) {
-      ++out.frames;
-      if (const Status s = run.add_stereo(*frame_); !s.ok()) add_count(out.incidents, std::string{"frame: "} + s.what);
-      if (const io::FileResult<bool> more = advance(); !more) return more.error();
+
+  /// Opens tracks or pictures, if there are any.
+  io::FileResult<bool> open(const SolveRequest& request, const SolveInputs& in) {
+    if (!request.tracks.empty()) {
+      auto tracks = TrackFrames::open(request.tracks, in.start);
+      if (!tracks) return tracks.error();
+      source_ = std::move(tracks).value();
+    } else if (!request.images.empty()) {
+      auto images = ImageFrames::open(request.images, in.image_options);
+      if (!images) return images.error();
+      (*images)->start_at(in.start);
+      source_ = std::move(images).value();
     }
     return true;
   }
-  /// What was left out of the file.
-  void note_skipped(SolveOutcome& out) const {
-    for (const io::SkippedItem& item : reader_.skipped().items()) add_count(out.incidents, "tracks: " + item.reason, static_cast<long>(item.count));
+  /// Hands over the frames up to a time that readings have reached. Errors: a row that cannot be read.
+  io::FileResult<bool> feed(GpsTime until) {
+    while (const std::optional<GpsTime> time = source_ ? source_->time() : std::nullopt) {
+      if (*time > until) break;
+      const Result<estimator::RtkSolution> predicted = run_.predict(*time);
+      const auto motion = predictor_->motion_to(predicted.ok() ? std::optional{*predicted} : std::nullopt);
+      ++out_.frames;
+      const io::FileResult<bool> taken = source_->take(motion, *frame_);
+      if (!taken) return taken.error();
+      if (!*taken) continue;
+      strip_.offer(frame_->time, source_->picture(), *frame_);
+      if (const Status s = run_.add_stereo(*frame_); !s.ok()) add_count(out_.incidents, std::string{"frame: "} + s.what);
+    }
+    return true;
+  }
+  /// Looks at what became of the last frame that was screened: after every answer of the run.
+  void take_screened() {
+    if (!source_) return;
+    if (const auto s = run_.screened()) strip_.judge(s->time, s->fates, s->fate);
+  }
+  /// Pictures for the report, and what was left out.
+  void finish() const {
+    if (!source_) return;
+    out_.strip = strip_.pictures();
+    for (const auto& [what, n] : source_->left_out()) add_count(out_.incidents, what, n);
   }
 
  private:
-  io::FileResult<bool> advance() {
-    const io::FileResult<bool> read = reader_.next(*frame_);
-    has_frame_ = read && *read;
-    return read;
-  }
-
-  precomputed::TrackReader reader_;
+  SolverRun& run_;
+  SolveOutcome& out_;
+  FrameStrip strip_;
+  std::unique_ptr<FrameSource> source_;
   std::unique_ptr<TrackFrame> frame_{std::make_unique<TrackFrame>()};
-  bool has_frame_{false};
+  std::optional<estimator::CameraPredictor> predictor_;
 };
 
-/// Measurements, frames and readings in the order of time; solutions as they become due. Errors: those of the tracks.
-io::FileResult<bool> feed(const SolveRequest& request, const SolveInputs& in, MeasurementFeed& measurements, TrackFeed& tracks, SolverRun& run,
+/// Measurements, readings and frames in the order of time; solutions as they become due. Errors: those of the frames.
+io::FileResult<bool> feed(const SolveRequest& request, const SolveInputs& in, MeasurementFeed& measurements, FrameFeed& frames, SolverRun& run,
                           SolveOutcome& out) {
   Drain drain{in, request.at_camera_rate, run, out};
   Progress progress{request.label, static_cast<std::size_t>(std::max(0.0, seconds_between(in.start, in.end) * 10)) + 1};
+  const auto look = [&frames] { frames.take_screened(); };
   std::size_t k = 0;
   while (measurements.has_more() || k < in.imu.size()) {
     if (measurements.has_more() && (k == in.imu.size() || measurements.time() <= in.imu[k].time)) {
       const GpsTime time = measurements.time();
       measurements.hand_over(drain);
-      drain.take_due();
+      drain.take_due(look);
       progress.update(static_cast<std::size_t>(seconds_between(in.start, time) * 10) + 1, drain.progress_note());
     } else {
-      if (const io::FileResult<bool> fed = tracks.feed(in.imu[k].time, run, out); !fed) return fed.error();
+      const GpsTime time = in.imu[k].time;
       if (const Status s = run.add_imu(in.imu[k++]); !s.ok()) add_count(out.incidents, std::string{"reading: "} + s.what);
-      drain.take_due();
-      if (request.at_imu_rate) drain.take_predicted();
+      if (const io::FileResult<bool> fed = frames.feed(time); !fed) return fed.error();
+      drain.take_due(look);
+      if (request.at_imu_rate) drain.take_predicted(time);
     }
   }
   run.finish();
-  drain.take_due();
+  drain.take_due(look);
   drain.finish();
   progress.finish();
   drop_predictions_at_solutions(out);
-  tracks.note_skipped(out);
+  frames.finish();
   return true;
 }
 
@@ -515,10 +539,10 @@ io::FileResult<SolveOutcome> solve(const SolveRequest& request, const SolveInput
   MeasurementFeed measurements{in, *run, out};
   if (const io::FileResult<bool> opened = measurements.open(request); !opened) return opened.error();
   const auto start = std::chrono::steady_clock::now();
-  TrackFeed tracks;
-  if (const io::FileResult<bool> opened = tracks.open(request.tracks, in); !opened) return opened.error();
-  if (const io::FileResult<bool> fed = feed(request, in, measurements, tracks, *run, out); !fed) return fed.error();
-  if (!request.tracks.empty()) out.stereo = run->stereo();
+  FrameFeed frames{in, *run, out};
+  if (const io::FileResult<bool> opened = frames.open(request, in); !opened) return opened.error();
+  if (const io::FileResult<bool> fed = feed(request, in, measurements, frames, *run, out); !fed) return fed.error();
+  if (request.has_camera()) out.stereo = run->stereo();
   out.wall_s = milliseconds_since(start) / 1000;
   score(request, in, out);
   out.outages = outages_of(in, out.rows);

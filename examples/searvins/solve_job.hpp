@@ -19,10 +19,12 @@
 #include <searvins/io/rinex_info.hpp>
 #include <searvins/io/trajectory.hpp>
 
+#include "examples/searvins/image_frames.hpp"
 #include "examples/searvins/solver_run.hpp"
 #include "examples/support/evaluation.hpp"
 #include "examples/support/rig.hpp"
 #include "examples/support/run_report.hpp"
+#include "examples/support/strip_picture.hpp"
 #include "examples/support/truth.hpp"
 
 namespace searvins::examples {
@@ -42,6 +44,7 @@ struct SolveRequest {
   std::string imu{};                       ///< log of an inertial unit; empty: GNSS only
   std::string positions{};                 ///< another program's positions, instead of rover, base and nav: loosely coupled
   std::string tracks{};                    ///< stereo tracks of a frontend, with an inertial unit
+  std::string images{};                    ///< folder of stereo pictures, instead of tracks: the reference frontend makes them
   std::vector<std::string> without{};      ///< parts of the screening of tracks that are switched off
   std::optional<double> heading_deg{};     ///< at the beginning, from elsewhere
   double heading_sigma_deg{5};
@@ -52,6 +55,8 @@ struct SolveRequest {
   estimator::RtkOptions options{};  ///< what neither rig nor profile sets
   std::string command{};            ///< the command line, for the report
   std::string label{"solve"};       ///< of the progress line
+
+  [[nodiscard]] bool has_camera() const { return !tracks.empty() || !images.empty(); }
 };
 
 /// The files, read and checked against each other.
@@ -70,6 +75,7 @@ struct SolveInputs {
   std::optional<estimator::StereoInertialOptions> inertial{};
   std::vector<imu::ImuSample> imu{};  ///< readings of the time to solve, in body axes
   double imu_interval_s{0};
+  ImageFrameOptions image_options{};  ///< of request.images
   std::vector<std::string> notes;  ///< what a user should know
 };
 
@@ -98,6 +104,7 @@ struct SolveOutcome {
   std::vector<AlignmentEvent> alignment;
   std::vector<Count> alignment_waits;  ///< rows that were not aligned, by what was waited for
   std::vector<Outage> outages;
+  std::vector<StripPicture> strip;      ///< frames with what became of their observations, where there are images
   std::optional<StereoReport> stereo;   ///< when there were frames
   long frames{0};                      ///< offered
   std::vector<Count> skipped;          ///< rover epochs without a solution, by reason

@@ -266,7 +266,7 @@ RunReport report_of(const SolveRequest& request, const SolveInputs& in, const So
   if (in.base && request.options.resolution.mode != ambiguity::ResolutionMode::off)
     report.success_rate_gate = in.options.resolution.min_success_rate;
   report.satellites = outcome.satellites, report.truth = in.truth, report.evaluation = outcome.evaluation;
-  report.outages = outcome.outages;
+  report.outages = outcome.outages, report.strip = outcome.strip;
   report.figures = run_figures(in, outcome), report.settings = settings(request, in), report.notes = notes(in, outcome);
   return report;
 }

@@ -9,6 +9,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include <searvins/core/status.hpp>
@@ -53,6 +54,14 @@ struct StereoReport {
   const char* refusal{""};  ///< of the last of them
 };
 
+/// The frame that a run has screened last. `fates` are of the observations that it came with, in their order; none when the frame had none
+/// or was out of order. They live in the run, until its next call of next().
+struct ScreenedFrame {
+  GpsTime time{};
+  std::span<const vision::ObservationFate> fates{};
+  vision::FrameFate fate{vision::FrameFate::empty};
+};
+
 /// One estimator at work. Inputs come in the order of time; solutions are taken with next() until none is due.
 class SolverRun {
  public:
@@ -73,11 +82,10 @@ class SolverRun {
   /// No more input will come.
   virtual void finish() {}
 
-  /// Whether a status of next() says that nothing is due, rather than what is wrong with an epoch.
-  [[nodiscard]] static bool is_nothing_due(const Status& s) { return s.code == StatusCode::no_data && std::string_view{s.what} == kNothingDue; }
+  /// As estimator::Estimator::next(): estimator::is_nothing_due() of its status says that nothing is due.
   virtual Result<estimator::RtkSolution> next() = 0;
-  /// The antenna at the time of the newest reading, from the newest solution and the readings since.
-  [[nodiscard]] virtual Result<estimator::RtkSolution> predict() const {
+  /// The antenna at a time that readings reach, from the newest solution and the readings since.
+  [[nodiscard]] virtual Result<estimator::RtkSolution> predict(GpsTime) const {
     return failure(StatusCode::unsupported, "this run has no inertial unit");
   }
 
@@ -91,9 +99,8 @@ class SolverRun {
   [[nodiscard]] virtual std::optional<AlignmentReport> alignment() const { return std::nullopt; }
   /// Nothing without an inertial unit.
   [[nodiscard]] virtual std::optional<StereoReport> stereo() const { return std::nullopt; }
-
- protected:
-  static constexpr const char* kNothingDue = "no solution is due";  ///< the words of estimator::Estimator
+  /// The newest of the frames that next() has screened; nothing while there is none.
+  [[nodiscard]] virtual std::optional<ScreenedFrame> screened() const { return std::nullopt; }
 };
 
 /// A run whose estimator answers each rover epoch at once.
@@ -104,7 +111,7 @@ class EpochRun : public SolverRun {
     return ok_status();
   }
   Result<estimator::RtkSolution> next() final {
-    if (!has_epoch_) return failure(StatusCode::no_data, kNothingDue);
+    if (!has_epoch_) return failure(StatusCode::no_data, estimator::kNothingDue);
     has_epoch_ = false;
     return update(epoch_);
   }

@@ -17,32 +17,20 @@
 #include <searvins/version.hpp>
 
 #include "examples/support/evaluation.hpp"
+#include "examples/support/html_text.hpp"
 #include "examples/support/report_charts.hpp"
 #include "examples/support/report_data.hpp"
 #include "examples/support/report_distributions.hpp"
+#include "examples/support/report_integrity.hpp"
 #include "examples/support/report_map.hpp"
 #include "examples/support/report_page.hpp"
 #include "examples/support/report_scales.hpp"
+#include "examples/support/report_strip.hpp"
 #include "examples/support/report_style.hpp"
 #include "examples/support/run_report.hpp"
 #include "examples/support/table.hpp"
 
 namespace searvins::examples {
-
-/// Text for HTML.
-[[nodiscard]] inline std::string html_text(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += c;
-    }
-  }
-  return out;
-}
 
 namespace detail {
 
@@ -169,6 +157,18 @@ namespace detail {
   return text + table_html(report.figures.empty() ? "" : "Run", report.figures) + outages_html(report);
 }
 
+/// Integrity of a scored run; nothing without truth or covariance.
+[[nodiscard]] inline std::string run_integrity_html(const RunReport& report) {
+  if (!report.evaluation || report.evaluation->with_error == 0) return {};
+  std::vector<double> ratios;
+  if (report.epochs.size() == report.rows.size())
+    for (const ReportEpoch& epoch : report.epochs) ratios.push_back(epoch.ratio);
+  const std::string name = "this run";
+  const Integrity integrity = assess_integrity(*report.evaluation, report.rows);
+  const std::vector<WrongFix> wrong_fixes = wrong_fixes_of(*report.evaluation, report.rows, ratios);
+  return integrity_html({{name, *report.evaluation, integrity, wrong_fixes}}, false);
+}
+
 [[nodiscard]] inline std::string settings_html(const RunReport& report) {
   std::string text;
   if (!report.notes.empty()) {
@@ -201,8 +201,8 @@ namespace detail {
   if (!report.command.empty()) text += "<p class=\"command\"><code>" + html_text(report.command) + "</code></p>";
   text += "</header>\n" + detail::tiles_html(report);
   if (report.rows.empty())
-    return text + "<section class=\"card\"><p>The run has no row.</p></section>\n" + detail::settings_html(report) +
-           "</main>\n</body>\n</html>\n";
+    return text + "<section class=\"card\"><p>The run has no row.</p></section>\n" + strip_section(report.strip) +
+           detail::settings_html(report) + "</main>\n</body>\n</html>\n";
   text +=
       "<section class=\"columns\">\n<div class=\"card mapcard\"><div class=\"head\"><h2>Track</h2><span class=\"buttons\" "
       "id=\"mapbuttons\"><button data-do=\"in\" aria-label=\"zoom in\">+</button>"
@@ -216,12 +216,13 @@ namespace detail {
   text +=
       "<section class=\"card\"><div class=\"head\"><h2>Over time</h2><span class=\"note\">GPS time of day</span><span class=\"buttons\" "
       "id=\"timebuttons\" style=\"margin-left:auto\"></span></div><div id=\"time\"></div></section>\n";
-  text += "<section class=\"three\" id=\"three\"></section>\n" + detail::settings_html(report);
+  text += "<section class=\"three\" id=\"three\"></section>\n" + detail::run_integrity_html(report) + strip_section(report.strip) +
+          detail::settings_html(report);
   text += std::string{"<footer>searvins "} + kVersionString +
           "</footer>\n</main>\n<div id=\"tip\" role=\"status\"></div>\n<noscript><p style=\"padding:24px\">The charts need JavaScript; the "
           "figures above do not.</p></noscript>\n";
   text += "<script type=\"application/json\" id=\"run-data\">" + detail::ReportData{report}.json() + "</script>\n<script>(() => {" +
-          kReportScales + kReportCharts + kReportMap + kReportDistributions + kReportPage + "})();</script>\n</body>\n</html>\n";
+          kReportScales + kReportCharts + kReportMap + kReportDistributions + kReportStanford + kReportPage + "})();</script>\n</body>\n</html>\n";
   return text;
 }
 

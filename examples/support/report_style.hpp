@@ -71,11 +71,26 @@ caption { text-align: left; font-weight: 650; padding: 0 0 4px; } table + table 
 .runs td, .runs th { text-align: right; white-space: nowrap; padding-left: 14px; }
 .runs td:first-child, .runs th:first-child { text-align: left; padding-left: 0; }
 .runs i { display: inline-block; width: 10px; height: 10px; border-radius: 3px; margin-right: 7px; }
+.runs.list td:nth-last-child(-n+2), .runs.list th:nth-last-child(-n+2) { text-align: left; }
+.runs b.over-share { color: var(--spp); font-weight: 640; }
+.runs.paper th { vertical-align: bottom; } .runs.paper tr:nth-child(2) th:first-child { text-align: right; padding-left: 14px; } .runs.paper th.group { text-align: center; border-bottom: 1px solid var(--line); }
+.runs tr.of-paper td { color: var(--muted); } .runs td small { margin-left: 7px; color: var(--muted); }
+.integrity h3, summary { font-size: 13px; font-weight: 620; margin: 16px 0 2px; } .integrity .head + h3 { margin-top: 4px; }
+summary { cursor: pointer; }
 .scroll { overflow-x: auto; }
 .share { display: flex; height: 12px; border-radius: 4px; overflow: hidden; margin: 4px 0 8px; background: var(--grid); }
 .share i { display: block; height: 100%; }
 .notes { margin: 0; padding-left: 18px; } .notes li { margin: 3px 0; }
 .settings { columns: 3 320px; column-gap: 32px; } .settings table { break-inside: avoid; }
+.strip { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 460px), 1fr)); gap: 16px; }
+.strip figure { margin: 0; min-width: 0; break-inside: avoid; }
+.strip img { display: block; width: 100%; height: auto; border-radius: 6px; background: #000; }
+.strip figcaption { display: flex; flex-wrap: wrap; gap: 0 12px; padding: 5px 2px 0; font-size: 12px; }
+.strip figcaption b { font-weight: 620; } .strip figcaption .count { margin-left: auto; }
+.strip figcaption small { flex-basis: 100%; font-size: 12px; color: var(--muted); }
+.marks { display: flex; flex-wrap: wrap; gap: 4px 16px; margin: 0 0 10px; font-size: 12px; color: var(--muted); }
+.marks svg { width: 15px; height: 15px; margin-right: 5px; vertical-align: -3px; }
+.marks i { display: inline-block; width: 64px; height: 9px; border-radius: 3px; vertical-align: -1px; }
 #tip { position: fixed; z-index: 9; pointer-events: none; background: var(--card); border: 1px solid var(--line); border-radius: 7px;
   padding: 6px 9px; font-size: 12px;
   box-shadow: 0 4px 16px rgba(0, 0, 0, 0.16); display: none; white-space: nowrap; max-width: 320px; }

@@ -14,6 +14,7 @@
 #include <searvins/io/trajectory.hpp>
 
 #include "examples/support/evaluation.hpp"
+#include "examples/support/strip_picture.hpp"
 #include "examples/support/truth.hpp"
 
 namespace searvins::examples {
@@ -72,6 +73,7 @@ struct RunReport {
   std::optional<TruthTrack> truth{};
   std::optional<Evaluation> evaluation{};  ///< scores for tiles, table and error distribution
   std::vector<Outage> outages{};           ///< shaded in the charts over time
+  std::vector<StripPicture> strip{};       ///< frames of the camera, in the order of time
   std::vector<ReportEntry> figures{};      ///< further lines of the table of figures
   std::vector<ReportEntry> settings{};
   std::vector<std::string> notes{};  ///< what was skipped and why

@@ -13,10 +13,10 @@
 using namespace searvins;
 
 TEST_CASE("Colours: young is blue, old is yellow, reasons differ") {
-  CHECK(orb::colour_of_age(1) == examples::Rgb{70, 110, 255});
-  CHECK(orb::colour_of_age(0) == orb::colour_of_age(1));
-  CHECK(orb::colour_of_age(orb::kFullAge) == examples::Rgb{255, 225, 40});
-  CHECK(orb::colour_of_age(1000) == orb::colour_of_age(orb::kFullAge));
+  CHECK(examples::colour_of_age(1) == examples::Rgb{70, 110, 255});
+  CHECK(examples::colour_of_age(0) == examples::colour_of_age(1));
+  CHECK(examples::colour_of_age(examples::kFullAge) == examples::Rgb{255, 225, 40});
+  CHECK(examples::colour_of_age(1000) == examples::colour_of_age(examples::kFullAge));
   for (std::size_t a = 0; a < orb::kMatchFates; ++a)
     for (std::size_t b = 0; b < a; ++b)
       CHECK_FALSE(orb::colour_of(static_cast<orb::MatchFate>(a)) == orb::colour_of(static_cast<orb::MatchFate>(b)));
@@ -38,7 +38,7 @@ TEST_CASE("Every feature has its mark") {
   for (std::size_t i = 0; i < frontend.features().size(); ++i) {
     const orb::Feature& f = frontend.features()[i];
     const bool is_followed = frontend.track_of_feature()[i] != 0;
-    const examples::Rgb expected = is_followed ? orb::colour_of_age(1) : orb::colour_of(frontend.stereo_matches()[i].fate);
+    const examples::Rgb expected = is_followed ? examples::colour_of_age(1) : orb::colour_of(frontend.stereo_matches()[i].fate);
     const int x = static_cast<int>(std::lround(f.u_px)) - (is_followed ? 2 : 0), y = static_cast<int>(std::lround(f.v_px));
     marked += picture(x, y) == expected ? 1U : 0U;
   }

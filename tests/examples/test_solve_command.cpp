@@ -139,11 +139,8 @@ TEST_CASE_FIXTURE(Fixture, "solve: usage errors exit with 2") {
   CHECK(solve("--arc 0").exit_code == 2);
   CHECK(solve("--base-ecef 1,2").exit_code == 2);
   CHECK(solve("--truth " + truth + " --truth-ecef 1,2,3").exit_code == 2);
-  for (const char* later : {"--images x", "--dataset texcup"}) {
-    const Outcome outcome = solve(later);
-    CHECK_MESSAGE(outcome.exit_code == 2, later);
-    CHECK_MESSAGE(has(outcome, "this version takes stereo tracks"), later);
-  }
+  CHECK(has(solve("--images x"), "--images x needs --imu FILE"));
+  CHECK(has(solve("--imu x --rig y --images x --tracks z"), "give either --tracks FILE or --images DIR"));
 }
 
 TEST_CASE_FIXTURE(Fixture, "solve: unusable files exit with 3, name the file and say what to do") {
