@@ -1,21 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // `searvins solve`: recordings in, trajectory and report out.
 #include <cstdio>
+#include <filesystem>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "examples/searvins/commands.hpp"
+#include "examples/searvins/dataset_request.hpp"
 #include "examples/searvins/solve_job.hpp"
 #include "examples/support/option_parser.hpp"
 
 namespace searvins::examples {
 namespace {
-
-/// Options of later versions: known, so that the message can say so.
-struct LaterOption {
-  const char *name, *value_name;
-};
-constexpr LaterOption kLaterOptions[] = {{"images", "DIR"}, {"dataset", "KIND"}};
 
 OptionParser solve_parser() {
   OptionParser parser{"searvins solve", "positions of a GNSS antenna, alone or with an inertial unit, from recordings"};
@@ -27,6 +25,7 @@ OptionParser solve_parser() {
   parser.value("imu", "FILE", "log of the inertial unit that --rig describes: tightly coupled, a solution through outages");
   parser.value("positions", "FILE", "another program's positions (.pos, or week,sow,x,y,z[,sd..]) instead of --rover, --base and --nav: loosely coupled");
   parser.value("tracks", "FILE", "stereo tracks of a frontend, pixels of the rectified pair that --rig describes; with --imu");
+  parser.value("images", "DIR", "stereo pictures in the EuRoC layout (cam0, cam1, labels0) instead of --tracks: the reference frontend finds and follows points");
   parser.value("without", "LIST", "parts of the screening of tracks to switch off: semantic, geometric, motion, maturity");
   parser.value("heading", "DEG[,SIGMA]", "heading at the start, clockwise from north, and its sigma; else found from the motion");
   parser.value("base-ecef", "X,Y,Z", "antenna of the base, ECEF metres; else the rig's, else that of the base file's header");
@@ -49,7 +48,13 @@ OptionParser solve_parser() {
   parser.value("truth", "FILE", "reference trajectory: errors are computed and shown");
   parser.value("truth-ecef", "X,Y,Z", "reference point of an antenna that does not move, ECEF metres");
   parser.value("rate", "WHAT", "rows to write: gnss (one a rover epoch), camera (also one a frame) or imu (also one a reading)").fallback("gnss");
-  for (const LaterOption& later : kLaterOptions) parser.value(later.name, later.value_name, "not in this version, which takes tracks, not pictures");
+  parser
+      .value("dataset", "LAYOUT",
+             "a published recording, all in one FOLDER: texcup, ppc, urbannav (docs/datasets.md); or euroc, stereo-inertial without GNSS: `searvins "
+             "solve --dataset euroc --help` lists what goes with it")
+      .one_of({"texcup", "ppc", "urbannav", "euroc"});
+  parser.value("sensors", "WHAT", "sensors of the --dataset: gnss; imu, with GNSS; all, what there is").fallback("all").one_of({"gnss", "imu", "all"});
+  parser.positionals("FOLDER", "recording of --dataset", 0, 1);
   parser.epilogue(
       "Written: trajectory.csv, trajectory_lagged.csv, solution.pos (RTKPLOT), trajectory.kml, trajectory_tum.txt (evo), summary.json, "
       "report.html.\nExit codes: 0 done, 2 usage, 3 unusable input, 4 the run ended without a solution.");
@@ -71,24 +76,23 @@ void take_signals(Options& options, SolveRequest& request) {
   }
 }
 
-void refuse_later_options(Options& options) {
-  for (const LaterOption& later : kLaterOptions)
-    if (options.given(later.name))
-      options.fail(std::string{"--"} + later.name + ": this version takes stereo tracks (--tracks), not pictures or other layouts; leave the option out");
+void check_rate(Options& options) {
   const std::string rate = options.text("rate");
-  if (rate == "camera" && !options.given("tracks")) options.fail("--rate camera needs --tracks FILE");
+  if (rate == "camera" && !options.given("tracks") && !options.given("images") && !options.given("dataset")) options.fail("--rate camera needs --tracks FILE or --images DIR");
   if (rate != "gnss" && rate != "camera" && rate != "imu") options.fail("--rate: '" + rate + "' is none of gnss, camera, imu");
 }
 
 /// Options of the inertial unit, and what each of them needs.
 void take_imu(Options& options, SolveRequest& request) {
   request.imu = options.text("imu");
+  const bool is_dataset = options.given("dataset");  // what is not named is in its folder
   request.at_imu_rate = options.text("rate") == "imu", request.at_camera_rate = options.text("rate") == "camera";
-  request.tracks = options.text("tracks"), request.without = options.list("without");
+  request.tracks = options.text("tracks"), request.images = options.text("images"), request.without = options.list("without");
   for (const std::string& part : request.without)
     if (part != "semantic" && part != "geometric" && part != "motion" && part != "maturity")
       options.fail("--without: '" + part + "' is none of semantic, geometric, motion, maturity");
-  if (!request.without.empty() && request.tracks.empty()) options.fail("--without needs --tracks FILE");
+  if (!request.without.empty() && !request.has_camera() && !is_dataset) options.fail("--without needs --tracks FILE or --images DIR");
+  if (!request.tracks.empty() && !request.images.empty()) options.fail("give either --tracks FILE or --images DIR");
   if (options.given("heading")) {
     const std::vector<double> heading = options.numbers("heading", options.list("heading").size() == 2 ? 2 : 1);
     if (!heading.empty()) request.heading_deg = heading[0];
@@ -96,8 +100,9 @@ void take_imu(Options& options, SolveRequest& request) {
     if (!(request.heading_sigma_deg > 0 && request.heading_sigma_deg <= 90))
       options.fail("--heading: the sigma must lie in 0 .. 90 degrees");
   }
+  if (is_dataset) return;
   if (request.imu.empty()) {
-    for (const char* name : {"heading", "rate", "tracks"})
+    for (const char* name : {"heading", "rate", "tracks", "images"})
       if (options.given(name) && options.text(name) != "gnss")
         options.fail(std::string{"--"} + name + ' ' + options.text(name) + " needs --imu FILE");
     return;
@@ -111,6 +116,7 @@ void take_imu(Options& options, SolveRequest& request) {
 void take_sources(Options& options, SolveRequest& request) {
   request.rover = options.text("rover"), request.base = options.text("base"), request.nav = options.texts("nav");
   request.positions = options.text("positions");
+  if (options.given("dataset")) return;
   if (request.positions.empty()) {
     if (request.rover.empty()) options.fail("--rover FILE is missing (or --positions FILE with --imu)");
     if (request.nav.empty()) options.fail("--nav FILE is missing");
@@ -121,8 +127,27 @@ void take_sources(Options& options, SolveRequest& request) {
   if (!options.given("imu")) options.fail("--positions needs --imu FILE: without readings there is nothing to couple the positions to");
 }
 
+/// Whether --dataset has its folder, and stands beside nothing that contradicts it.
+void check_dataset(Options& options) {
+  const std::vector<std::string>& folders = options.positionals();
+  if (!options.given("dataset")) {
+    if (!folders.empty()) options.fail("unexpected argument '" + folders.front() + "'");
+    if (options.given("sensors")) options.fail("--sensors chooses among those of a --dataset: without it, name the files or leave them out");
+    return;
+  }
+  if (folders.empty()) options.fail("FOLDER of the recording is missing");
+  for (const char* name : {"imu", "positions"})
+    if (options.given(name)) options.fail(std::string{"--dataset is given: leave --"} + name + " out");
+  const std::string sensors = options.text("sensors");
+  for (const char* name : {"tracks", "images", "without"})
+    if (options.given(name) && sensors != "all") options.fail(std::string{"--"} + name + " needs --sensors all");
+  if (options.text("rate") == "camera" && sensors != "all") options.fail("--rate camera needs --sensors all");
+  if ((options.text("rate") == "imu" || options.given("heading")) && sensors == "gnss") options.fail("--rate imu and --heading need --sensors imu or all");
+}
+
 SolveRequest request_of(Options& options) {
   SolveRequest request;
+  check_dataset(options);
   take_sources(options, request);
   request.rig = options.text("rig"), request.truth = options.text("truth");
   request.truth_point_e_m = point(options, "truth-ecef"), request.base_position_e_m = point(options, "base-ecef");
@@ -143,7 +168,7 @@ SolveRequest request_of(Options& options) {
   o.arc_epochs = static_cast<int>(options.integer("arc", 1, 1000));
   o.lag_s = options.number("lag", 0, 600);
   if (!request.truth.empty() && request.truth_point_e_m) options.fail("give either --truth FILE or --truth-ecef X,Y,Z");
-  if (request.base.empty() && request.base_position_e_m) options.fail("--base-ecef needs --base FILE");
+  if (request.base.empty() && request.base_position_e_m && !options.given("dataset")) options.fail("--base-ecef needs --base FILE");
   return request;
 }
 
@@ -155,15 +180,29 @@ int unusable(const io::Diagnostic& error) {
 }  // namespace
 
 int run_solve(int argc, const char* const* argv) {
+  for (int i = 1; i < argc; ++i)
+    if (const std::string_view argument{argv[i]};
+        argument == "--dataset=euroc" || (argument == "--dataset" && i + 1 < argc && std::string_view{argv[i + 1]} == "euroc"))
+      return run_solve_euroc(argc, argv);
   Options options = solve_parser().parse(argc, argv);
-  refuse_later_options(options);
+  check_rate(options);
   SolveRequest request = request_of(options);
   if (const auto code = options.finished()) return *code;
   request.command = "searvins solve";
   for (int i = 1; i < argc; ++i) (request.command += ' ') += argv[i];
 
-  const io::FileResult<SolveInputs> inputs = prepare(request);
+  std::vector<std::string> notes;
+  if (options.given("dataset")) {
+    const std::string sensors = options.text("sensors");
+    const DatasetWish wish{options.text("dataset"), options.positionals().front(), (std::filesystem::path{options.text("out")} / "inputs").string(),
+                           sensors != "gnss", sensors == "all"};
+    io::FileResult<DatasetRequest> made = dataset_request(wish, request);
+    if (!made) return unusable(made.error());
+    request = std::move(made->request), notes = std::move(made->notes);
+  }
+  io::FileResult<SolveInputs> inputs = prepare(request);
   if (!inputs) return unusable(inputs.error());
+  inputs->notes.insert(inputs->notes.begin(), notes.begin(), notes.end());
   const io::FileResult<SolveOutcome> outcome = solve(request, *inputs);
   if (!outcome) return unusable(outcome.error());
   const std::string folder = options.text("out");

@@ -7,6 +7,7 @@
 namespace searvins::examples {
 
 int run_solve(int argc, const char* const* argv);     ///< recordings -> trajectory, report
+int run_solve_euroc(int argc, const char* const* argv);  ///< `solve --dataset euroc`: stereo-inertial, without GNSS
 int run_info(int argc, const char* const* argv);      ///< what is in an input file
 int run_evaluate(int argc, const char* const* argv);  ///< scores trajectories against a truth
 int run_simulate(int argc, const char* const* argv);  ///< makes a drive with all its sensors

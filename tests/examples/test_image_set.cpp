@@ -42,6 +42,19 @@ TEST_CASE("pictures on disk: the layout is read as a recording, images and class
   const auto stereo = examples::stereo_calibration(recording.left, recording.right);
   CHECK(test::close(stereo.t_c1_c0_m, Eigen::Vector3d{-rig.baseline_m, 0, 0}, 1e-9));
   CHECK(test::close(stereo.R_c1_c0, Eigen::Matrix3d::Identity(), 1e-9));
+  // Readings from a second before to a second after, and the truth: what the vehicle did.
+  REQUIRE(recording.imu.samples.size() == 2201);
+  CHECK(recording.imu.samples.front().time == simulation.options().start.plus_seconds(-1));
+  CHECK(recording.imu.samples.front().accel_b_mps2.z() == doctest::Approx(9.8).epsilon(0.02));
+  REQUIRE(recording.imu_noise.has_value());
+  CHECK(recording.imu_noise->gyro_noise_radps_sqrt_hz == doctest::Approx(simulation.options().imu_noise.gyro_noise_radps_sqrt_hz).epsilon(1e-5));
+  REQUIRE(recording.truth.size() == 401);
+  for (const std::size_t i : {std::size_t{0}, std::size_t{200}, std::size_t{400}}) {
+    const VehicleState x = simulation.vehicle().state(0.05 * static_cast<double>(i));
+    CHECK(test::close(recording.truth[i].p_w_m, x.p_w_m, 1e-4));
+    CHECK(test::close(recording.truth[i].q_wb.toRotationMatrix(), x.R_wb, 1e-7));
+    CHECK(test::close(recording.truth[i].v_w_mps, x.v_w_mps, 1e-4));
+  }
   std::size_t k = 0;
   for_each_frame(simulation, small, [&](GpsTime time, double, const StereoFrame& frame) {
     const examples::EurocPair& pair = recording.pairs[k++];
