@@ -16,6 +16,7 @@
 #include <searvins/version.hpp>
 
 #include "examples/searvins/solve_job.hpp"
+#include "examples/support/assessment.hpp"
 #include "examples/support/evaluation_tables.hpp"
 #include "examples/support/json_writer.hpp"
 #include "examples/support/report.hpp"
@@ -339,6 +340,7 @@ std::string summary_json(const SolveRequest& request, const SolveInputs& in, con
     json.member("fix_rate_pct", e->fix_rate_pct);
     member_errors(json, "fixed_horizontal", e->fixed_horizontal);
     json.member("mean_nees", e->mean_nees).member("nees_within_95_pct", e->nees_within_95_pct).end_object();
+    member_assessment(json, *e, outcome.rows, outcome.ratios);
   }
   member_counts(json, "skipped_epochs", outcome.skipped), member_counts(json, "incidents", outcome.incidents);
   member_counts(json, "rejected_signals", rejections(outcome)), member_counts(json, "integer_resolution", outcomes(outcome));

@@ -17,25 +17,25 @@
 #include <searvins/io/text_fields.hpp>
 #include <searvins/io/trajectory.hpp>
 
+#include "examples/support/assessment.hpp"
 #include "examples/support/evaluation.hpp"
 #include "examples/support/json_writer.hpp"
+#include "examples/support/paper_table.hpp"
 #include "examples/support/report.hpp"
+#include "examples/support/report_integrity.hpp"
 #include "examples/support/table.hpp"
 
 namespace searvins::examples {
 
 /// A run of the page.
-struct ComparedRun {
-  std::string name;
-  std::vector<io::TrajectoryRow> rows;
-  Evaluation evaluation;
-};
+using ComparedRun = AssessedRun;
 
 /// Everything the page shows.
 struct Comparison {
   std::string title{"searvins comparison"};
   std::string command{};
   std::vector<ComparedRun> runs{};  ///< at least one, scored against one truth
+  std::vector<PaperTableRow> table{};  ///< the paper's tables; empty: none
 };
 
 namespace detail {
@@ -116,6 +116,28 @@ D.runs.forEach((r, k) => panel(r.name, k ? '' : 'status', k ? null : () => STATU
     rows: i => D.runs.map((r, k) => [r.name, r[key] && ok(r[key][i]) ? (nees ? r[key][i].toFixed(2) : metres(r[key][i])) : '–', color(k)])
   });
 });
+if (D.integrity && D.runs.some(r => has(r.b))) {
+  const all = sorted([].concat(...D.runs.map(r => r.b))), lo = Math.max(1e-4, quantile(all, 0.01) * 0.7);
+  panel('Horizontal bound', stanfordNote(), names, {
+    height: 130,
+    scale: 'log',
+    format: axisMetres,
+    range: () => [lo, Math.max(quantile(all, 1), D.integrity.limit) * 1.4],
+    paint: c => {
+      c.mark(D.integrity.limit, C.status[3]);
+      for (let k = D.runs.length - 1; k >= 0; --k) c.dots(D.runs[k].b.map(v => ok(v) ? Math.max(v, lo) : null), () => color(k), 1.5);
+    },
+    rows: i => D.runs.map((r, k) => [r.name, metres(r.b[i]), color(k)])
+  });
+  if ($('stanford')) {
+    const range = stanfordRange([].concat(...D.runs.map(r => [r.h, r.b])));
+    D.runs.forEach((r, k) => {
+      if (has(r.b))
+        new StanfordView(
+            headed($('stanford'), el('div', 'card'), r.name, 'Stanford diagram', null, 'h2'), r.h, r.b, range, () => color(k));
+    });
+  }
+}
 const map = new TracksView($('maphost'));
 $('mapbuttons').querySelectorAll('button').forEach(b => b.onclick = () => {
   if (b.dataset.do === 'all') {
@@ -161,6 +183,7 @@ matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
     }
     return '[' + text + ']';
   };
+  const IntegrityOptions& options = comparison.runs.front().integrity.options;
   std::string runs, overall_s, overall_e, overall_n;
   for (const ComparedRun& run : comparison.runs) {
     std::vector<const ScoredEpoch*> at(times.size(), nullptr);
@@ -178,12 +201,13 @@ matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
             ",\"h\":" + list(at, 4, [](const ScoredEpoch& x) { return x.horizontal_m(); }) +
             ",\"v\":" + list(at, 4, [](const ScoredEpoch& x) { return std::abs(x.error_enu_m.z()); }) +
             ",\"d\":" + list(at, 4, [](const ScoredEpoch& x) { return x.spatial_m(); }) +
-            ",\"q\":" + list(at, 3, [](const ScoredEpoch& x) { return x.nees; }) + '}';
+            ",\"q\":" + list(at, 3, [](const ScoredEpoch& x) { return x.nees; }) +
+            ",\"b\":" + list(at, 4, [&](const ScoredEpoch& x) { return horizontal_bound_m(x, run.rows, options.risk); }) + '}';
   }
   std::string t;
   for (const GpsTime time : times) t += (t.empty() ? "" : ",") + io::fixed_text(seconds_between(start, time), 3);
   return "{\"sow\":" + json_literal(start.sow()) + ",\"t\":[" + t + "],\"s\":" + overall_s + ",\"e\":" + overall_e + ",\"n\":" + overall_n +
-         ",\"runs\":[" + runs + "]}";
+         ",\"integrity\":" + integrity_data(options) + ",\"runs\":[" + runs + "]}";
 }
 
 [[nodiscard]] inline std::string compare_table(const Comparison& comparison) {
@@ -215,6 +239,7 @@ matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
       "</style>\n</head>\n<body>\n<main>\n<header><div class=\"over\">searvins comparison</div><h1>" + title + "</h1>";
   if (!comparison.command.empty()) text += "<p class=\"command\"><code>" + html_text(comparison.command) + "</code></p>";
   text += "</header>\n<section class=\"card\"><div class=\"head\"><h2>Figures</h2></div>" + detail::compare_table(comparison) + "</section>\n";
+  if (!comparison.table.empty()) text += paper_table_html(comparison.table);
   text += "<section class=\"three\" id=\"three\"></section>\n";
   text +=
       "<section class=\"card\"><div class=\"head\"><h2>Over time</h2><span class=\"note\">GPS time of day; drag to zoom, double click to see it "
@@ -224,11 +249,14 @@ matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
       "aria-label=\"zoom in\">+</button><button data-do=\"out\" aria-label=\"zoom out\">&minus;</button><button "
       "data-do=\"all\">all</button></span><span id=\"maplegend\" style=\"margin-left:auto\"></span></div><div class=\"grow\" id=\"maphost\" "
       "role=\"img\" aria-label=\"map of the tracks\"></div></section>\n";
+  std::vector<IntegrityEntry> entries;
+  for (const ComparedRun& run : comparison.runs) entries.push_back({run.name, run.evaluation, run.integrity, run.wrong_fixes});
+  text += integrity_html(entries);
   text += std::string{"<footer>searvins "} + kVersionString +
           "</footer>\n</main>\n<div id=\"tip\" role=\"status\"></div>\n<noscript><p style=\"padding:24px\">The charts need JavaScript; the "
           "figures above do not.</p></noscript>\n";
   return text + "<script type=\"application/json\" id=\"run-data\">" + detail::compare_json(comparison) + "</script>\n<script>(() => {" +
-         kReportScales + kReportCharts + kReportMap + detail::kCompareMap + kReportDistributions + detail::kComparePage +
+         kReportScales + kReportCharts + kReportMap + detail::kCompareMap + kReportDistributions + kReportStanford + detail::kComparePage +
          "})();</script>\n</body>\n</html>\n";
 }
 

@@ -78,6 +78,8 @@ struct Evaluation {
 
   std::size_t with_nees{0};
   double mean_nees{io::kUnknown}, nees_within_95_pct{io::kUnknown};  ///< share of NEES below 7.815 (chi-square, 3, 95 %)
+
+  double step_s{1};  ///< between evaluation epochs, as asked for
 };
 
 inline constexpr double kWrongFixM = 0.5;
@@ -202,6 +204,7 @@ inline void summarize(Evaluation& evaluation) {
                                                          const EvaluationOptions& options = {}) {
   if (truth.points.empty() || rows.empty()) return io::Diagnostic{{}, 0, "nothing to score: the truth or the trajectory is empty", {}};
   Evaluation evaluation;
+  evaluation.step_s = options.step_s;
   const std::int64_t half_step_ns = nanoseconds_from_seconds(options.step_s) / 2;
   for (const GpsTime t : detail::evaluation_epochs(truth, rows, options)) {
     ScoredEpoch& epoch = evaluation.epochs.emplace_back();

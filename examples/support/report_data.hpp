@@ -17,7 +17,9 @@
 #include <searvins/geodesy/local_frame.hpp>
 #include <searvins/io/text_fields.hpp>
 
+#include "examples/support/integrity.hpp"
 #include "examples/support/json_writer.hpp"
+#include "examples/support/report_integrity.hpp"
 #include "examples/support/run_report.hpp"
 
 namespace searvins::examples {
@@ -196,16 +198,19 @@ class ReportData {
   /// Errors of the evaluation epochs, for their distribution.
   void add_scores() {
     if (!report_.evaluation) return;
-    std::string horizontal, spatial, fixed;
+    std::string horizontal, spatial, fixed, bounds;
+    const IntegrityOptions options;
     const std::vector<ScoredEpoch>& epochs = report_.evaluation->epochs;
     for (const ScoredEpoch& epoch : epochs) {
       if (!epoch.has_error()) continue;
       append_number(horizontal += horizontal.empty() ? "" : ",", epoch.horizontal_m(), 4);
       append_number(spatial += spatial.empty() ? "" : ",", epoch.spatial_m(), 4);
+      append_number(bounds += bounds.empty() ? "" : ",", horizontal_bound_m(epoch, report_.rows, options.risk), 4);
       if (epoch.status == io::SolutionStatus::fix) append_number(fixed += fixed.empty() ? "" : ",", epoch.horizontal_m(), 4);
     }
-    text_ += ",\"scored\":{\"n\":" + std::to_string(epochs.size()) + ",\"h\":[" + horizontal + "],\"d\":[" + spatial + "],\"f\":[" + fixed +
-             "]}";
+    text_ += ",\"scored\":{\"n\":" + std::to_string(epochs.size()) + ",\"h\":[" + horizontal + "],\"d\":[" + spatial + "],\"b\":[" + bounds +
+             "],\"f\":[" + fixed + "]}";
+    text_ += ",\"integrity\":" + integrity_data(options);
   }
 
   void add_sky() {

@@ -219,6 +219,26 @@ if (has(D.nees)) {
   });
 }
 
+if (D.integrity && has(D.h) && has(D.se) && has(D.cen)) {
+  const bounds = D.se.map((s, i) => {
+    const a = s * s, c = D.sn[i] * D.sn[i];
+    return ok(s) && ok(D.cen[i]) ? D.integrity.k * Math.sqrt((a + c) / 2 + Math.hypot((a - c) / 2, D.cen[i])) : null;
+  });
+  const both = sorted(D.h.concat(bounds)).filter(v => v > 0), lo = Math.max(1e-4, quantile(both, 0.01) * 0.7);
+  panel('Horizontal error and its bound', stanfordNote(), () => [['bound', C.ink, 1]], {
+    height: 150,
+    scale: 'log',
+    format: axisMetres,
+    range: () => [lo, Math.max(quantile(both, 1), D.integrity.limit) * 1.4],
+    paint: c => {
+      c.mark(D.integrity.limit, C.status[3]);
+      c.line(bounds, C.ink, 1.1);
+      c.dots(D.h.map(v => ok(v) ? Math.max(v, lo) : null), i => C.status[D.s[i]], 1.7, worst());
+    },
+    rows: i => [['error', metres(D.h[i])], ['bound', metres(bounds[i])]]
+  });
+}
+
 /* Motion: velocity, attitude, biases. */
 const three = (title, note, names, series, colors, options) => {
   const all = sorted([].concat(...series)), lo = quantile(all, options.log ? 0 : 0.0005), hi = quantile(all, options.log ? 1 : 0.9995),
@@ -319,6 +339,10 @@ if (D.scored && has(D.scored.h)) {
       card('Error distribution', '', () => sets.filter(s => has(s[1])).map(s => [s[0], s[2](), 1])), sets,
       s => s[0].endsWith('fixed') ? s[1].length : D.scored.n);
 }
+
+if (D.integrity && has(D.scored.b))
+  new StanfordView(
+      card('Stanford diagram', stanfordNote(), null), D.scored.h, D.scored.b, stanfordRange([D.scored.h, D.scored.b]), () => C.accent);
 
 if (D.sky && D.sky.length)
   new SkyView(

@@ -83,7 +83,10 @@ TEST_CASE("report: the embedded data are strict JSON, every column as long as th
     }
     CHECK((data.find("ee") != nullptr) == report.truth.has_value());
     CHECK(data.find("ms") == nullptr);  // a column without any value is left out
-    if (report.evaluation) CHECK(data.find("scored")->find("h")->elements.size() == report.evaluation->with_error);
+    if (report.evaluation) {
+      CHECK(data.find("scored")->find("h")->elements.size() == report.evaluation->with_error);
+      CHECK(data.find("scored")->find("b")->elements.size() == report.evaluation->with_error);
+    }
   });
 }
 
@@ -168,4 +171,41 @@ TEST_CASE("report: the script is well-formed (where node is there to tell)") {
   REQUIRE(io::write_text_file(path, html.substr(begin, end - begin)).empty());
   CHECK(std::system(("node --check '" + path + "'").c_str()) == 0);
   std::filesystem::remove(path);
+}
+
+TEST_CASE("report: integrity is shown where there is a truth, bounds where there are covariances, wrong fixes where there are some") {
+  Rng rng{12};
+  for (const bool covariances : {false, true}) {
+    RunReport report = random_report(rng, 30);
+    report.truth.reset(), report.evaluation.reset();
+    CHECK(report_html(report).find("<h2>Integrity</h2>") == std::string::npos);
+    for (TrajectoryRow& row : report.rows) {
+      row.sd_enu_m.setConstant(io::kUnknown), row.status = SolutionStatus::fix;
+      if (covariances) row.set_covariance_enu_m2(Eigen::Matrix3d::Identity());
+    }
+    report.truth = static_truth(report.rows[0].p_e_m);
+    report.evaluation = *evaluate(*report.truth, report.rows);
+    const std::string html = report_html(report);
+    CHECK(html.find("<h2>Integrity</h2>") != std::string::npos);
+    CHECK(html.find("<h2>Wrong fixes</h2>") != std::string::npos);
+    const Json data = data_of(html);
+    CHECK(data.find("integrity")->find("k")->number == doctest::Approx(horizontal_bound_factor(1e-5)));
+    for (const Json& bound : data.find("scored")->find("b")->elements) {
+      CHECK(bound.is(covariances ? Json::Kind::number : Json::Kind::null));
+      if (covariances) CHECK(bound.number == doctest::Approx(horizontal_bound_factor(1e-5)).epsilon(1e-4));
+    }
+  }
+}
+
+TEST_CASE("report: names in the integrity tables are escaped") {
+  Rng rng{13};
+  RunReport report = random_report(rng, 10);
+  report.truth = static_truth(report.rows[0].p_e_m + Eigen::Vector3d{9, 9, 9});
+  for (TrajectoryRow& row : report.rows) row.status = SolutionStatus::fix;
+  const Evaluation evaluation = *evaluate(*report.truth, report.rows);
+  const Integrity integrity = assess_integrity(evaluation, report.rows);
+  const std::vector<WrongFix> fixes = wrong_fixes_of(evaluation, report.rows);
+  const std::string name = "<i>run</i>", html = integrity_html({{name, evaluation, integrity, fixes}});
+  CHECK(html.find("<i>run") == std::string::npos);
+  CHECK(html.find("&lt;i&gt;run&lt;/i&gt;") != std::string::npos);
 }
