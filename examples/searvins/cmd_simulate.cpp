@@ -126,7 +126,8 @@ io::Diagnostic write_pictures(const sim::Simulation& simulation, sim::Layout lay
                               const std::filesystem::path& folder) {
   Progress progress("render", 100);
   const io::Diagnostic wrong =
-      sim::write_images(simulation, size, folder, [&progress](double share) { progress.update(static_cast<std::size_t>(100 * share)); });
+      sim::write_images(simulation, size, folder, [&progress](double share) { progress.update(static_cast<std::size_t>(100 * share)); },
+                        layout == sim::Layout::texcup ? sim::StampScale::unix_utc : sim::StampScale::gps);
   progress.finish();
   if (!wrong.message.empty()) return wrong;
   const sim::StereoRig rig = sim::scaled_rig(sim::StereoRig{}, size.width_px, size.height_px);
@@ -174,7 +175,7 @@ int run_simulate(int argc, const char* const* argv) {
   parser.value("seed", "N", "another seed is another drive").fallback("1");
   parser.value("route", "FILE", "truth file whose positions the vehicle follows; else streets are made up");
   parser.value("nav", "FILE", "RINEX navigation file with the satellites; else constellations are made up");
-  parser.value("layout", "NAME", "names and forms of the files").one_of({"plain", "texcup"}).fallback("plain");
+  parser.value("layout", "NAME", "names and forms of the files").one_of({"plain", "texcup", "ppc", "urbannav"}).fallback("plain");
   parser.value("rover-rate", "HZ", "rate of the rover's receiver").one_of({"1", "2", "5", "10"}).fallback("1");
   parser.value("imu-sample", "KIND", "what an IMU row stands for").one_of({"instantaneous", "mean_to_stamp"}).fallback("instantaneous");
   parser.value("images", "WxH", "also render pictures of this size, EuRoC layout, for example 640x240 (about 15 a second)");
@@ -211,7 +212,11 @@ int run_simulate(int argc, const char* const* argv) {
   if (failed) return unusable({folder.string(), 0, "could not be made: " + failed.message(), "choose another folder with --out"});
   Progress progress("simulate", 100);
   const sim::Simulation simulation(wanted);
-  const sim::Layout layout = options.text("layout") == "texcup" ? sim::Layout::texcup : sim::Layout::plain;
+  const std::string form = options.text("layout");
+  const sim::Layout layout = form == "texcup"     ? sim::Layout::texcup
+                             : form == "ppc"      ? sim::Layout::ppc
+                             : form == "urbannav" ? sim::Layout::urbannav
+                                                  : sim::Layout::plain;
   const sim::Dataset set = sim::make_dataset(
       simulation, layout, [&progress](double share) { progress.update(static_cast<std::size_t>(std::max(0.0, 100 * share))); });
   for (const sim::DatasetFile& file : set.files)

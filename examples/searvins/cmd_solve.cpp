@@ -50,10 +50,13 @@ OptionParser solve_parser() {
   parser.value("rate", "WHAT", "rows to write: gnss (one a rover epoch), camera (also one a frame) or imu (also one a reading)").fallback("gnss");
   parser
       .value("dataset", "LAYOUT",
-             "a published recording, all in one FOLDER: texcup, ppc, urbannav (docs/datasets.md); or euroc, stereo-inertial without GNSS: `searvins "
+             "a published recording, all in one FOLDER: texcup, ppc, urbannav (docs/datasets.md); or euroc, stereo-inertial without GNSS: "
+             "`searvins "
              "solve --dataset euroc --help` lists what goes with it")
       .one_of({"texcup", "ppc", "urbannav", "euroc"});
-  parser.value("sensors", "WHAT", "sensors of the --dataset: gnss; imu, with GNSS; all, what there is").fallback("all").one_of({"gnss", "imu", "all"});
+  parser.value("sensors", "WHAT", "sensors of the --dataset: gnss; imu, with GNSS; all, what there is")
+      .fallback("all")
+      .one_of({"gnss", "imu", "all"});
   parser.positionals("FOLDER", "recording of --dataset", 0, 1);
   parser.epilogue(
       "Written: trajectory.csv, trajectory_lagged.csv, solution.pos (RTKPLOT), trajectory.kml, trajectory_tum.txt (evo), summary.json, "
@@ -132,7 +135,8 @@ void check_dataset(Options& options) {
   const std::vector<std::string>& folders = options.positionals();
   if (!options.given("dataset")) {
     if (!folders.empty()) options.fail("unexpected argument '" + folders.front() + "'");
-    if (options.given("sensors")) options.fail("--sensors chooses among those of a --dataset: without it, name the files or leave them out");
+    if (options.given("sensors"))
+      options.fail("--sensors chooses among those of a --dataset: without it, name the files or leave them out");
     return;
   }
   if (folders.empty()) options.fail("FOLDER of the recording is missing");
@@ -142,7 +146,8 @@ void check_dataset(Options& options) {
   for (const char* name : {"tracks", "images", "without"})
     if (options.given(name) && sensors != "all") options.fail(std::string{"--"} + name + " needs --sensors all");
   if (options.text("rate") == "camera" && sensors != "all") options.fail("--rate camera needs --sensors all");
-  if ((options.text("rate") == "imu" || options.given("heading")) && sensors == "gnss") options.fail("--rate imu and --heading need --sensors imu or all");
+  if ((options.text("rate") == "imu" || options.given("heading")) && sensors == "gnss")
+    options.fail("--rate imu and --heading need --sensors imu or all");
 }
 
 SolveRequest request_of(Options& options) {
@@ -194,8 +199,8 @@ int run_solve(int argc, const char* const* argv) {
   std::vector<std::string> notes;
   if (options.given("dataset")) {
     const std::string sensors = options.text("sensors");
-    const DatasetWish wish{options.text("dataset"), options.positionals().front(), (std::filesystem::path{options.text("out")} / "inputs").string(),
-                           sensors != "gnss", sensors == "all"};
+    const DatasetWish wish{options.text("dataset"), options.positionals().front(),
+                           (std::filesystem::path{options.text("out")} / "inputs").string(), sensors != "gnss", sensors == "all"};
     io::FileResult<DatasetRequest> made = dataset_request(wish, request);
     if (!made) return unusable(made.error());
     request = std::move(made->request), notes = std::move(made->notes);

@@ -4,7 +4,12 @@
 ///
 ///     plain      rover.obs base.obs nav.rnx imu.csv truth.csv rig.json stereo_tracks.csv labels.csv
 ///     texcup     the names and forms of TEX-CUP: asterx4_rover.obs, asterx4_base_1hz.obs, brdmDDD0.YYp, lord_imu.log (raw axes left,
-///                forward, down), ground_truth.log (UTC, 1 Hz); truth.csv, rig.json, stereo_tracks.csv, labels.csv as above
+///                forward, down), ground_truth.log (UTC, 1 Hz)
+///     ppc        those of the PPC-Dataset: rover.obs, base.obs, base.nav, imu.csv (forward, left, up; deg/s), reference.csv (5 Hz)
+///     urbannav   those of UrbanNav Hong Kong: UrbanNav-SIM.ublox.f9p.obs, hksc_base.obs, brdmDDD0.YYp, xsense_imu_sim.csv (ROS columns,
+///                UTC stamps), UrbanNav_SIM_GT_raw.txt (a point 0.14 m above the IMU, degrees, minutes, seconds)
+///
+/// The last three have truth.csv, rig.json, stereo_tracks.csv and labels.csv beside them, as above.
 #pragma once
 
 #include <Eigen/Core>
@@ -32,7 +37,7 @@ struct DatasetFile {
 };
 
 /// Which names and forms the files have.
-enum class Layout { plain, texcup };
+enum class Layout { plain, texcup, ppc, urbannav };
 
 /// What the rover met in one kind of neighbourhood: satellites are counted by their first signal.
 struct DistrictSummary {
@@ -126,6 +131,67 @@ struct TruthRow {
   return text;
 }
 
+namespace detail {
+
+/// Roll, pitch and heading (clockwise from north) of a body, degrees.
+[[nodiscard]] inline Eigen::Vector3d attitude_deg(const Eigen::Matrix3d& R_enu_b) {
+  constexpr double deg = 180 / std::numbers::pi;
+  return {std::atan2(-R_enu_b(2, 0), R_enu_b(2, 2)) * deg, std::asin(R_enu_b(2, 1)) * deg,
+          std::fmod(std::atan2(R_enu_b(0, 1), R_enu_b(1, 1)) * deg + 360, 360)};
+}
+
+/// "-12 34 56.78901" of an angle in degrees.
+[[nodiscard]] inline std::string sexagesimal(double angle_deg) {
+  const long long units = std::llround(std::abs(angle_deg) * 3600e5);  // of 1e-5 seconds of arc
+  return formatted("%s%lld %02lld %02lld.%05lld", angle_deg < 0 ? "-" : "", units / 360'000'000, units / 6'000'000 % 60,
+                   units / 100'000 % 60, units % 100'000);
+}
+
+}  // namespace detail
+
+/// reference.csv of the PPC-Dataset: the antenna at 5 Hz.
+[[nodiscard]] inline std::string reference_text(const Simulation& s) {
+  constexpr double deg = 180 / std::numbers::pi;
+  std::string text =
+      "GPS TOW (s),GPS Week,Latitude (deg),Longitude (deg),Ellipsoid Height (m),ECEF X (m),ECEF Y (m),ECEF Z (m),Roll (deg),Pitch (deg),"
+      "Heading (deg),East Velocity (m/s),North Velocity (m/s),Up Velocity (m/s)\n";
+  for (int k = 0; k <= static_cast<int>(s.options().duration_s) * 5; ++k) {
+    const detail::TruthRow r = detail::truth_row(s, 0.2 * k);
+    const geodesy::Geodetic g = geodesy::geodetic_from_ecef(r.antenna_e_m);
+    const Eigen::Vector3d a = detail::attitude_deg(r.R_enu_b), &v = r.antenna_velocity_mps;
+    text += formatted("%.2f,%ld,%.9f,%.9f,%.4f,%.4f,%.4f,%.4f", detail::sow(s, 0.2 * k), detail::week(s, 0.2 * k), g.lat_rad * deg,
+                      g.lon_rad * deg, g.height_m, r.antenna_e_m.x(), r.antenna_e_m.y(), r.antenna_e_m.z());
+    text += formatted(",%.4f,%.4f,%.4f,%.4f,%.4f,%.4f\n", a[0], a[1], a[2], v.x(), v.y(), v.z());
+  }
+  return text;
+}
+
+/// The truth of UrbanNav Hong Kong: 1 Hz, 0.14 m above the IMU, velocity and acceleration in body axes.
+[[nodiscard]] inline std::string span_truth_text(const Simulation& s) {
+  constexpr double deg = 180 / std::numbers::pi;
+  std::string text =
+      "      UTCTime       Week   GPSTime         Latitude        Longitude        H-Ell VelBdyX VelBdyY VelBdyZ AccBdyX AccBdyY AccBdyZ   "
+      "        "
+      "Roll          Pitch        Heading Q\n"
+      "        (sec)    (weeks)     (sec)       (+/-D M S)       (+/-D M S)          (m)   (m/s)   (m/s)   (m/s) (m/s^2) (m/s^2) (m/s^2)   "
+      "       "
+      "(deg)          (deg)          (deg)  \n";
+  for (int k = 0; k <= static_cast<int>(s.options().duration_s); ++k) {
+    const detail::TruthRow r = detail::truth_row(s, k);
+    const Eigen::Matrix3d R_e_enu = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(r.antenna_e_m));
+    const geodesy::Geodetic g = geodesy::geodetic_from_ecef(r.imu_e_m + R_e_enu * r.R_enu_b * Eigen::Vector3d{0, 0, 0.14});
+    const Eigen::Vector3d a = detail::attitude_deg(r.R_enu_b), v = r.R_enu_b.transpose() * r.imu_velocity_mps;
+    const Eigen::Vector3d f =
+        r.R_enu_b.transpose() * (detail::truth_row(s, k + 0.5).imu_velocity_mps - detail::truth_row(s, k - 0.5).imu_velocity_mps);
+    const double utc_s = static_cast<double>(to_utc(s.options().start.plus_seconds(k)).unix_ns) * 1e-9;
+    text += formatted("%13.2f %10.5f %9.2f  %16s %16s %12.3f", utc_s, static_cast<double>(detail::week(s, k)), detail::sow(s, k),
+                      detail::sexagesimal(g.lat_rad * deg).c_str(), detail::sexagesimal(g.lon_rad * deg).c_str(), g.height_m);
+    text += formatted(" %7.3f %7.3f %7.3f %7.3f %7.3f %7.3f %14.10f %14.10f %14.9f 1\n", v.x(), v.y(), v.z(), f.x(), f.y(), f.z(), a[0],
+                      a[1], a[2] > 180 ? a[2] - 360 : a[2]);
+  }
+  return text;
+}
+
 /// rig.json of the layout, with the camera of the tracks or another.
 [[nodiscard]] inline std::string rig_text(const Simulation& s, Layout layout, const StereoRig& c = {}) {
   const ImuNoise& n = s.options().imu_noise;
@@ -133,7 +199,9 @@ struct TruthRow {
   std::string text = "{\n  \"schema\": 1,\n  \"imu\": {\n";
   text += formatted("    \"rate_hz\": %.10g,\n    \"sample\": \"%s\",\n    \"axes\": %s,\n", s.options().imu_rate_hz,
                     s.options().imu_sampling == ImuSampling::instantaneous ? "instantaneous" : "mean_to_stamp",
-                    layout == Layout::texcup ? "[\"-x\", \"y\", \"-z\"]" : "[\"x\", \"y\", \"z\"]");
+                    layout == Layout::texcup ? "[\"-x\", \"y\", \"-z\"]"
+                    : layout == Layout::ppc  ? "[\"-y\", \"x\", \"z\"]"
+                                             : "[\"x\", \"y\", \"z\"]");
   text += formatted("    \"accel_noise_mps2_sqrt_hz\": %.10g,\n    \"gyro_noise_radps_sqrt_hz\": %.10g,\n", n.accel_noise_mps2_sqrt_hz,
                     n.gyro_noise_radps_sqrt_hz);
   text += formatted("    \"accel_bias_walk_mps3_sqrt_hz\": %.10g,\n    \"gyro_bias_walk_radps2_sqrt_hz\": %.10g,\n",
@@ -149,15 +217,48 @@ struct TruthRow {
   text += formatted("    \"size_px\": [%.10g, %.10g],\n    \"R_b_c\": [\n", c.width_px, c.height_px);
   for (int i = 0; i < 3; ++i)
     text += formatted("      [%.16g, %.16g, %.16g]%s\n", c.R_bc(i, 0), c.R_bc(i, 1), c.R_bc(i, 2), i < 2 ? "," : "");
-  text +=
-      formatted("    ],\n    \"t_b_c_m\": [%.10g, %.10g, %.10g],\n    \"sigma_px\": 0.7\n  },\n", c.t_bc_m.x(), c.t_bc_m.y(), c.t_bc_m.z());
+  text += formatted("    ],\n    \"t_b_c_m\": [%.10g, %.10g, %.10g],\n    \"sigma_px\": 0.7\n  },\n", c.t_bc_m.x(), c.t_bc_m.y(),
+                    c.t_bc_m.z());
   text += "  \"gnss\": {\"signals\": [\"G1C\", \"G2W\", \"E1C\", \"E7Q\", \"C2I\"], \"elevation_mask_deg\": 15, \"min_cn0_dbhz\": 20},\n";
-  return text + "  \"semantic\": {\"reject_classes\": [3, 4]}\n}\n";
+  return text + "  \"semantic\": {\"reject_classes\": [3, 4, 6]}\n}\n";
 }
 
-/// The IMU log: CSV in body axes, or the LORD log in its raw axes (left, forward, down).
+namespace detail {
+
+/// What stands above the readings.
+[[nodiscard]] inline std::string imu_header(Layout layout) {
+  if (layout == Layout::plain) return "week,sow,gx,gy,gz,ax,ay,az\n";
+  if (layout == Layout::ppc)
+    return "GPS TOW (s), GPS Week, Acc X (m/s^2), Acc Y (m/s^2), Acc Z (m/s^2), Ang Rate X (deg/s),  Ang Rate Y (deg/s),  Ang Rate Z "
+           "(deg/s)\n";
+  if (layout == Layout::texcup) return {};
+  const auto covariance = [](const std::string& name) {
+    std::string columns;
+    for (int i = 0; i < 9; ++i) columns += ",field." + name + "_covariance" + std::to_string(i);
+    return columns;
+  };
+  return "%time,field.header.seq,field.header.stamp,field.header.frame_id,field.orientation.x,field.orientation.y,field.orientation.z,"
+         "field.orientation.w" +
+         covariance("orientation") + ",field.angular_velocity.x,field.angular_velocity.y,field.angular_velocity.z" +
+         covariance("angular_velocity") + ",field.linear_acceleration.x,field.linear_acceleration.y,field.linear_acceleration.z" +
+         covariance("linear_acceleration") + '\n';
+}
+
+/// A reading of UrbanNav: `k` counts them.
+[[nodiscard]] inline std::string ros_reading(int k, GpsTime stamp, const Eigen::Vector3d& f, const Eigen::Vector3d& w) {
+  const long long ns = static_cast<long long>(to_utc(stamp).unix_ns);
+  std::string zeros;
+  for (int i = 0; i < 9; ++i) zeros += ",0.0";
+  return formatted("%lld,%d,%lld,imu,0.0,0.0,0.0,1.0", ns, k, ns) + zeros + formatted(",%.9f,%.9f,%.9f", w.x(), w.y(), w.z()) + zeros +
+         formatted(",%.8f,%.8f,%.8f", f.x(), f.y(), f.z()) + zeros + '\n';
+}
+
+}  // namespace detail
+
+/// The IMU log: CSV in body axes, the LORD log in its raw axes (left, forward, down), or another of the layouts.
 [[nodiscard]] inline std::string imu_text(const Simulation& s, Layout layout, const ProgressCall& progress) {
-  std::string text = layout == Layout::plain ? "week,sow,gx,gy,gz,ax,ay,az\n" : "";
+  constexpr double deg = 180 / std::numbers::pi;
+  std::string text = detail::imu_header(layout);
   ImuSensor sensor = s.imu();
   const int rate = static_cast<int>(std::llround(s.options().imu_rate_hz));
   const int last = static_cast<int>(std::llround(s.options().duration_s * rate)) + rate;
@@ -170,6 +271,15 @@ struct TruthRow {
     if (layout == Layout::plain) {
       text += formatted("%ld,%.4f,%.7f,%.7f,%.7f,%.6f,%.6f,%.6f\n", static_cast<long>(stamp.week()), stamp.sow(), w.x(), w.y(), w.z(),
                         f.x(), f.y(), f.z());
+      continue;
+    }
+    if (layout == Layout::ppc) {
+      text += formatted("%.2f,%ld,%.6f,%.6f,%.6f,%.7f,%.7f,%.7f\n", stamp.sow(), static_cast<long>(stamp.week()), f.y(), -f.x(), f.z(),
+                        w.y() * deg, -w.x() * deg, w.z() * deg);
+      continue;
+    }
+    if (layout == Layout::urbannav) {
+      text += detail::ros_reading(k + rate, stamp, f, w);
       continue;
     }
     const double whole = std::floor(stamp.sow() + 1e-6);
@@ -218,10 +328,27 @@ inline void count(DistrictSummary& summary, const SignalLabel& l) {
 
 }  // namespace detail
 
+namespace detail {
+
+/// What the files of a layout are called.
+struct FileNames {
+  std::string rover, base, nav, imu;
+};
+[[nodiscard]] inline FileNames file_names(Layout layout, GpsTime start) {
+  const CivilTime day = civil_from_gps(start);
+  const int day_of_year = static_cast<int>(days_from_civil(day.year, day.month, day.day) - days_from_civil(day.year, 1, 1)) + 1;
+  const std::string brdm = formatted("brdm%03d0.%02dp", day_of_year, day.year % 100);
+  if (layout == Layout::texcup) return {"asterx4_rover.obs", "asterx4_base_1hz.obs", brdm, "lord_imu.log"};
+  if (layout == Layout::ppc) return {"rover.obs", "base.obs", "base.nav", "imu.csv"};
+  if (layout == Layout::urbannav) return {"UrbanNav-SIM.ublox.f9p.obs", "hksc_base.obs", brdm, "xsense_imu_sim.csv"};
+  return {"rover.obs", "base.obs", "nav.rnx", "imu.csv"};
+}
+
+}  // namespace detail
+
 /// Makes all files. `progress` gets the share that is done.
 [[nodiscard]] inline Dataset make_dataset(
     const Simulation& s, Layout layout, const ProgressCall& progress = [](double) {}) {
-  const bool texcup = layout == Layout::texcup;
   const GpsTime start = s.options().start;
   const double rate = s.options().rover_rate_hz;
   const auto part = [&progress](double from, double to) {
@@ -250,14 +377,15 @@ inline void count(DistrictSummary& summary, const SignalLabel& l) {
   std::string base_text = observation_header("BASE", s.base_e_m(), start);
   for (int k = 0; k <= static_cast<int>(s.options().duration_s); ++k) base_text += observation_epoch(base.measure(k), start);
 
-  const CivilTime day = civil_from_gps(start);
-  const int day_of_year = static_cast<int>(days_from_civil(day.year, day.month, day.day) - days_from_civil(day.year, 1, 1)) + 1;
-  set.files.push_back({texcup ? "asterx4_rover.obs" : "rover.obs", std::move(rover_text)});
-  set.files.push_back({texcup ? "asterx4_base_1hz.obs" : "base.obs", std::move(base_text)});
-  set.files.push_back({texcup ? formatted("brdm%03d0.%02dp", day_of_year, day.year % 100) : "nav.rnx", navigation_file(s.records())});
-  set.files.push_back({texcup ? "lord_imu.log" : "imu.csv", imu_text(s, layout, part(0.45, 0.8))});
+  const detail::FileNames names = detail::file_names(layout, start);
+  set.files.push_back({names.rover, std::move(rover_text)});
+  set.files.push_back({names.base, std::move(base_text)});
+  set.files.push_back({names.nav, navigation_file(s.records())});
+  set.files.push_back({names.imu, imu_text(s, layout, part(0.45, 0.8))});
   set.files.push_back({"truth.csv", truth_text(s)});
-  if (texcup) set.files.push_back({"ground_truth.log", ground_truth_text(s)});
+  if (layout == Layout::texcup) set.files.push_back({"ground_truth.log", ground_truth_text(s)});
+  if (layout == Layout::ppc) set.files.push_back({"reference.csv", reference_text(s)});
+  if (layout == Layout::urbannav) set.files.push_back({"UrbanNav_SIM_GT_raw.txt", span_truth_text(s)});
   set.files.push_back({"rig.json", rig_text(s, layout)});
   set.files.push_back({"stereo_tracks.csv", tracks_text(s, part(0.82, 1))});
   set.files.push_back({"labels.csv", std::move(labels)});

@@ -106,7 +106,7 @@ namespace detail {
   if (has(first, "track_id")) return FileKind::stereo_tracks;
   if (has(first, "ecef_x_m") && has(first, "status")) return FileKind::trajectory;
   if (has(first, "ant_x") || has(first, "ecef_x") || has(first, "ECEF X") || has(first, "ecefX")) return FileKind::truth;
-  if (has(first, ",") && (has(first, "w_RS_S_x") || has(first, "gx") || has(first, "gyro") || has(first, "wx_"))) return FileKind::imu_csv;
+  if (has(first, ",") && (has(first, "w_RS_S_x") || has(first, "gx") || (has(first, "gyro") && !has(first, "gyro1")) || has(first, "wx_"))) return FileKind::imu_csv;
   const std::string_view row = first_line(head, true);
   const int numbers = count_numbers(row);
   if (numbers == 7) return FileKind::imu_csv;
