@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Shows what searvins does: installs what is missing (apt), builds the command, solves the bundled synthetic recording and, where
-# ../shared/data lies beside the project, the real ones. Everything it writes is under build/.
+# Shows what searvins does: installs what is missing (apt), builds the command, solves the bundled synthetic recording, makes a drive with
+# pictures and solves it with one sensor more at a time, and, where ../shared/data lies beside the project, solves real recordings.
+# Everything it writes is under build/.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -20,6 +21,32 @@ solve_synthetic() {
   echo
   echo "== The bundled synthetic recording"
   "$searvins" demo --out "$out"
+}
+
+# A minute of an urban drive: satellites alone, with the inertial unit, with a stereo camera. One table, one page.
+solve_drive() {
+  local drive=$out/drive runs=$out/drive_runs run
+  echo
+  echo "== A simulated urban drive of 60 s with stereo pictures"
+  "$searvins" simulate --profile urban --duration 60 --seed 5 --images 640x240 --out "$drive"
+  local common=(--rover "$drive/rover.obs" --base "$drive/base.obs" --nav "$drive/nav.rnx" --truth "$drive/truth.csv")
+  local unit=(--imu "$drive/imu.csv" --rig "$drive/rig.json")
+  # solve_one NAME ARGUMENTS...
+  solve_one() {
+    local name=$1
+    shift
+    "$searvins" solve "${common[@]}" --out "$runs/$name" "$@" >"$runs/$name.txt" || [ $? -eq 4 ]  # 4: no solution at the end, still scored
+  }
+  mkdir -p "$runs"
+  solve_one GNSS --rig "$drive/rig.json"
+  solve_one GNSS+IMU "${unit[@]}"
+  for run in scalar latent symmetric; do
+    solve_one "stereo_$run" "${unit[@]}" --tracks "$drive/stereo_tracks.csv" --robust "$run"
+  done
+  solve_one stereo_from_pictures --imu "$drive/imu.csv" --rig "$drive/rig_images.json" --images "$drive"
+  "$searvins" evaluate --truth "$drive/truth.csv" --paper --report "$out/drive.html" \
+    "GNSS=$runs/GNSS" "GNSS+IMU=$runs/GNSS+IMU" "stereo, scalar=$runs/stereo_scalar" "stereo, latent=$runs/stereo_latent" \
+    "stereo, symmetric=$runs/stereo_symmetric" "stereo, pictures=$runs/stereo_from_pictures"
 }
 
 # solve_real FOLDER TRUTH_OPTIONS... : the recording FOLDER with its rover.obs and base.obs; the rest goes to the command.
@@ -42,12 +69,14 @@ solve_recordings() {
 say_where_the_reports_are() {
   echo
   echo "Open in a browser:"
+  echo "  $out/drive.html"
   find "$out" -name report.html | sort | sed 's/^/  /'
 }
 
 main() {
   build
   solve_synthetic
+  solve_drive
   if [ -d "$real" ]; then
     solve_recordings
   else
