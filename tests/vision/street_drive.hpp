@@ -27,7 +27,7 @@ class StreetDrive {
 
   explicit StreetDrive(Rng& rng, double sigma_px = 0.3) : rng_(&rng), sigma_px_(sigma_px) {
     for (int i = 0; i < 400; ++i)
-      points_.emplace_back((chance(rng, 0.5) ? -1 : 1) * uniform(rng, 3, 12), uniform(rng, -5, 1.5), uniform(rng, 0, 120));
+      points_.push_back(random_point_of_street(rng));
   }
 
   /// Moves on (way forward, turn to the right) and looks.
@@ -45,6 +45,11 @@ class StreetDrive {
   [[nodiscard]] GpsTime time() const { return GpsTime::from_week_sow(2323, 1000 + 0.1 * frames_); }
 
  private:
+  /// Braces: their order of evaluation is the same with every compiler, so is the street.
+  [[nodiscard]] static Eigen::Vector3d random_point_of_street(Rng& rng) {
+    return {(chance(rng, 0.5) ? -1 : 1) * uniform(rng, 3, 12), uniform(rng, -5, 1.5), uniform(rng, 0, 120)};
+  }
+
   [[nodiscard]] Frame look() {
     const auto camera = car_camera();
     Frame frame;

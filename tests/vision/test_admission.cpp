@@ -313,13 +313,24 @@ TEST_CASE("bad input: 5000 keypoints: what has no room in the frame or in the ta
   CHECK(run.admission->counts().of(ObservationFate::capacity) == shown - Frame::kCapacity);
   CHECK(run.admission->counts().offered() - before == shown);
 
-  using Small = StereoAdmission<StreetDrive::kTracks, 20>;
-  const auto small = std::make_unique<Small>(car_camera(), sharp_options());
-  for (int i = 0; i < 5; ++i) REQUIRE(small->add(run.drive.next(), run.drive.prediction(), *run.out).ok());
-  CHECK(small->tracks().size() == 20);
-  CHECK(small->counts().of(ObservationFate::no_room) > 0);
-  CHECK(run.out->fate == FrameFate::full);
-  CHECK(run.out->observations.size() > 10);
+}
+
+TEST_CASE("bad input: a table smaller than a frame: what has no room is counted, who is in it is admitted") {
+  std::size_t admitted = 0, drives = 0;
+  for_all_seeds(20, [&](Rng& rng) {
+    Run run(rng);
+    run.warm_up();
+    using Small = StereoAdmission<StreetDrive::kTracks, 20>;
+    const auto small = std::make_unique<Small>(car_camera(), sharp_options());
+    for (int i = 0; i < 5; ++i) REQUIRE(small->add(run.drive.next(), run.drive.prediction(), *run.out).ok());
+    CHECK(small->tracks().size() == 20);
+    CHECK(small->counts().of(ObservationFate::no_room) > 0);
+    CHECK(run.out->fate == FrameFate::full);
+    CHECK(run.out->observations.size() <= 20);
+    admitted += run.out->observations.size(), ++drives;
+  });
+  // Those that leave the picture give their room to points that have yet to mature: how many are left differs from drive to drive.
+  CHECK(admitted > 5 * drives);
 }
 
 TEST_CASE("admission: what the frontend says to lie near a rejected class is refused as its boundary") {
