@@ -219,10 +219,11 @@ class FixedLagRun {
     expect(motion_.start(workload_time(0), imu::ImuBias<double>{}, o).ok());
   }
 
-  /// So many Gauss-Newton steps an update; the solvers to compare with did two.
+  /// So many Gauss-Newton steps an update; the solvers to compare with did two. A step that an outlier's track makes too long is halved rather
+  /// than damped: no update costs several factorisations.
   static Smoother::Options options_of(int iterations) {
     Smoother::Options o;
-    o.max_iterations = iterations;
+    o.max_iterations = iterations, o.max_step_halvings = 2;
     return o;
   }
 

@@ -21,7 +21,8 @@
 ///     1. relinearise   variables that moved more than the threshold: theta <- x; their factors: e, J at theta
 ///     2. reweight      robust weights at the estimate x
 ///     3. eliminate     from the first front that changed
-///     4. step          x' = theta (+) d,  accepted when sum rho(x') <= sum rho(x); otherwise damped and solved again
+///     4. step          x' = theta (+) d,  accepted when sum rho(x') <= sum rho(x); otherwise halved where the options allow it (d is a direction
+///                      of descent: no new factorisation), then damped and solved again
 ///
 /// Guarantees: an operation that fails leaves values, prior and structure as they were, bit for bit. Same calls, same bits.
 #pragma once
@@ -147,7 +148,7 @@ class FixedLagSmoother {
       relinearise(options);
       if (damped_) elimination_.mark_dirty_from(0), damped_ = false;
       Scalar damping = 0;
-      bool accepted = false;
+      bool accepted = false, whole = true;
       Scalar step = 0;
       for (int attempt = 0; attempt <= options.max_damping_steps; ++attempt) {
         report.fronts_factored += elimination_.front_count() - elimination_.first_dirty();
@@ -156,10 +157,15 @@ class FixedLagSmoother {
           const Status why = describe(failure_report, report.where);  // fills `where` before the report is copied
           return give_up(report, why);
         }
-        solve();
-        const Scalar proposed = evaluate(Which::candidate);
+        elimination_.solve(tables());
+        Scalar proposed = propose();
+        for (int halvings = 0; damping == 0 && !decreases(proposed, cost) && halvings < options.max_step_halvings; ++halvings) {
+          halve_step();
+          proposed = propose();
+          ++report.halved_steps, whole = false;
+        }
         step = largest_step();
-        if (std::isfinite(proposed) && proposed <= cost + kCostRounding * (Scalar(1) + std::abs(cost))) {
+        if (decreases(proposed, cost)) {
           cost = proposed, accepted = true;
           break;
         }
@@ -180,7 +186,7 @@ class FixedLagSmoother {
       }
       accept();
       report.final_cost = cost, report.last_step = step;
-      if (step <= options.step_tolerance) {
+      if (whole && step <= options.step_tolerance) {  // a halved step is short because it was halved
         report.status = ok_status();
         return report;
       }
@@ -304,6 +310,7 @@ class FixedLagSmoother {
 
   /// Rows and Jacobians of the factors whose variables' theta moved; weights that changed by more than the threshold.
   void linearise_factors(Scalar weight_threshold) {
+    int first_changed = elimination_.front_count();
     for (int id : tables().living_factors) {
       FactorInfo& f = tables().factor(id);
       if (!tables().enabled(f)) continue;
@@ -316,8 +323,9 @@ class FixedLagSmoother {
       for (int i = 0; i < f.rows; ++i) reweighted = reweighted || std::abs(now[i] - weights[i]) > weight_threshold;
       if (!reweighted) continue;
       std::copy_n(now, f.rows, weights);
-      elimination_.mark_dirty_from(f.front);
+      first_changed = std::min(first_changed, f.front);
     }
+    elimination_.mark_dirty_from(first_changed);
     for (int id : tables().living_variables) window_.info(id).relinearised = false;
   }
 
@@ -326,12 +334,24 @@ class FixedLagSmoother {
     return elimination_.factorise(tables(), prior_, damping, policy, only);
   }
 
-  /// The step of the present factorisation: candidate_delta and candidate = theta (+) candidate_delta.
-  void solve() {
-    elimination_.solve(tables());
+  /// candidate = theta (+) candidate_delta; returns its cost.
+  [[nodiscard]] Scalar propose() {
     for (int id : tables().living_variables) {
       const VariableInfo& info = window_.info(id);
       if (info.role != Role::local || info.first_factor >= 0) window_.retract(id);
+    }
+    return evaluate(Which::candidate);
+  }
+  [[nodiscard]] static bool decreases(Scalar proposed, Scalar cost) {
+    return std::isfinite(proposed) && proposed <= cost + kCostRounding * (Scalar(1) + std::abs(cost));
+  }
+  /// candidate_delta to the middle between the estimate and the candidate: same direction, along which the cost falls at first.
+  void halve_step() {
+    for (int id : tables().living_variables) {
+      const VariableInfo& info = window_.info(id);
+      Scalar* const candidate = tables().candidate_delta.data() + info.tangent;
+      const Scalar* const delta = tables().delta.data() + info.tangent;
+      for (int i = 0; i < info.dof; ++i) candidate[i] = (candidate[i] + delta[i]) / 2;
     }
   }
 

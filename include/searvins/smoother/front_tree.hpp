@@ -187,15 +187,18 @@ class FrontTree {
       front.parent = -1;
       front.offset = tangent_size_;
       front.shape = 1469598103934665603ULL;
-      bool fits = list_eliminated(tables, f) && take_factors(tables, f, front.first_factor);
-      for (int l = front.first_local; fits && l >= 0; l = tables.variable(l).next) fits = take_factors(tables, f, tables.variable(l).first_factor);
+      bool fits = list_eliminated(tables, f);
+      if (f == prior_front_)
+        for (int id : prior_variables) fits = fits && take(tables, f, id, tables.variable(id).prior_axes);
       for (int c = 0; fits && c < f; ++c) {
         const Front& child = fronts_[at(c)];
         if (child.parent != f) continue;
         for (int k = child.eliminated; k < child.eliminated + child.separated; ++k) fits = fits && take(tables, f, members_[at(child.first + k)], axes(child.first + k));
       }
-      if (f == prior_front_)
-        for (int id : prior_variables) fits = fits && take(tables, f, id, tables.variable(id).prior_axes);
+      const int inherited = used_;
+      fits = fits && take_factors(tables, f, front.first_factor);
+      for (int l = front.first_local; fits && l >= 0; l = tables.variable(l).next) fits = take_factors(tables, f, tables.variable(l).first_factor);
+      if (fits) sort_members(tables, inherited);
       if (!fits) return false;
       close_separator(tables, front);
     }
@@ -248,6 +251,22 @@ class FrontTree {
     ++front.separated;
     if (front.parent < 0 || v.front < front.parent) front.parent = v.front;
     return true;
+  }
+
+  /// Brings the members from `first` on into an order that lasts: states by age, then chain variables by index. Those before it keep the order of
+  /// the children (whose update matrices then are added by long runs).
+  void sort_members(const TablesType& tables, int first) {
+    const auto before = [&](int a, int b) {
+      const VariableInfo &va = tables.variable(a), &vb = tables.variable(b);
+      if (va.role != vb.role) return va.role == Role::state;
+      return va.role == Role::state ? va.front < vb.front : a < b;
+    };
+    for (int k = first + 1; k < used_; ++k) {  // few, and nearly in order
+      const int id = members_[at(k)], axes = axes_[at(k)];
+      int to = k;
+      for (; to > first && before(id, members_[at(to - 1)]); --to) members_[at(to)] = members_[at(to - 1)], axes_[at(to)] = axes_[at(to - 1)];
+      members_[at(to)] = id, axes_[at(to)] = axes;
+    }
   }
 
   /// Counts the axes of a separator that is complete.

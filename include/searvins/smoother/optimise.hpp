@@ -27,6 +27,8 @@ struct OptimiseOptions {
   Scalar weight_threshold{0};           ///< a factor is reweighted when a row's weight changed by more than this
   Scalar initial_damping{Scalar(1e-4)};  ///< first Levenberg-Marquardt damping after a step that did not decrease the cost
   int max_damping_steps{8};             ///< damping grows tenfold each
+  int max_step_halvings{0};             ///< an undamped step that did not decrease the cost is halved up to so often before it is damped: each
+                                        ///< halving costs one evaluation, each damping a factorisation of every front
   PriorLinearisation prior{PriorLinearisation::relinearise};
 };
 
@@ -51,6 +53,7 @@ struct OptimiseReport {
   Scalar initial_cost{0}, final_cost{0};
   Scalar last_step{0};  ///< largest axis movement of the last step, in units of linearisation_scale()
   int damped_steps{0};
+  int halved_steps{0};     ///< OptimiseOptions::max_step_halvings
   int fronts_factored{0};  ///< over all iterations
   UnderDetermined where{};
 };

@@ -54,6 +54,10 @@ struct FactorInfo {
   int keys{0}, columns{0}, rows{0};
   int first_key{0}, first_row{0}, first_column{0}, first_jacobian{0};  ///< places in the tables
   int front{-1}, next{-1};                            ///< set by the symbolic analysis: front, next factor of the same list
+
+  /// Few rows and columns: summed as a dense block, for which the spans of its columns are not wanted.
+  [[nodiscard]] bool is_small() const { return rows <= kSmallRows && columns <= kSmallColumns; }
+  static constexpr int kSmallRows = 4, kSmallColumns = 32;
 };
 
 /// Rows [first, end) of a Jacobian column, outside of which it is zero: a row sees few of its batch's ambiguities.

@@ -263,7 +263,7 @@ class Window {
     std::fill_n(J.data, static_cast<std::ptrdiff_t>(info.rows) * info.columns, Scalar(0));
     Scalar* const e = tables.e_theta.data() + info.first_row;
     detail::with_type(FactorTypes{}, info.type, [&]<class F>() { factor_at<F>(id).linearise(values(Which::theta), e, J); });
-    tables.find_spans(info);
+    if (!info.is_small()) tables.find_spans(info);
   }
 
   /// Erases the variables for whose global index `gone` holds, in ascending order; returns how many.
