@@ -59,7 +59,7 @@ struct DopplerRow {
   double rate_mps{0};  ///< measured, satellite clock removed, minus that of a receiver at rest
   double sigma_mps{0};
   double residual_mps{0};                              ///< at the solution
-  Eigen::Vector4d direction{Eigen::Vector4d::Zero()};  ///< d rate / d (velocity, drift)
+  Eigen::Matrix<double, 4, 1, Eigen::DontAlign> direction{Eigen::Vector4d::Zero()};  ///< d rate / d (velocity, drift)
 };
 
 inline constexpr std::size_t kMaxDopplerRows = 2 * kMaxSatellitesPerEpoch;  ///< Dopplers of one solution
@@ -68,7 +68,7 @@ inline constexpr std::size_t kMaxDopplerRows = 2 * kMaxSatellitesPerEpoch;  ///<
 struct DopplerVelocity {
   Eigen::Vector3d velocity_e_mps{Eigen::Vector3d::Zero()};
   double drift_mps{0};                                  ///< c times the rate of the receiver clock
-  Eigen::Matrix4d covariance{Eigen::Matrix4d::Zero()};  ///< of (velocity, drift); scaled up when the chi-square test fails
+  Eigen::Matrix<double, 4, 4, Eigen::DontAlign> covariance{Eigen::Matrix4d::Zero()};  ///< of (velocity, drift); scaled up when the chi-square test fails
   StaticVector<DopplerRow, kMaxDopplerRows> rows{};
   int used{0}, excluded{0};
   double chi_square{0};
@@ -83,7 +83,7 @@ namespace detail {
 /// Weighted least squares over the used rows. False when the geometry does not determine the four unknowns.
 template <class Weight>
 [[nodiscard]] bool solve_doppler(const DopplerVelocity& d, const VelocityPrior& prior, Weight weight, Eigen::Vector4d& x,
-                                 Eigen::Matrix4d* covariance = nullptr) {
+                                 Eigen::Matrix<double, 4, 4, Eigen::DontAlign>* covariance = nullptr) {
   Eigen::Matrix4d N = Eigen::Matrix4d::Zero();
   Eigen::Vector4d g = Eigen::Vector4d::Zero();
   N.topLeftCorner<3, 3>() = prior.information;

@@ -29,9 +29,10 @@ inline constexpr std::size_t kCodesPerSatellite = 2;  ///< carriers of one satel
 inline constexpr std::size_t kMaxCodeRows = kCodesPerSatellite * kMaxSatellitesPerEpoch;  ///< codes of one solution
 
 /// Position (0..2), clocks of the constellations (3..6) and delay of the other carriers (7), all metres.
-using SinglePointVector = Eigen::Matrix<double, kSinglePointUnknowns, 1>;
+/// Not aligned for vector registers: the layout of a solution does not follow machine flags.
+using SinglePointVector = Eigen::Matrix<double, kSinglePointUnknowns, 1, Eigen::DontAlign>;
 /// Covariance of a SinglePointVector, m^2.
-using SinglePointMatrix = Eigen::Matrix<double, kSinglePointUnknowns, kSinglePointUnknowns>;
+using SinglePointMatrix = Eigen::Matrix<double, kSinglePointUnknowns, kSinglePointUnknowns, Eigen::DontAlign>;
 
 /// What became of a satellite's code.
 enum class CodeFate : std::uint8_t {

@@ -80,7 +80,7 @@ struct AdmittedFrame {
   StaticVector<ObservationFate, N> fates{};             ///< of the observations offered, in their order
   bool has_motion{false};                               ///< PnP found a motion since the previous frame
   CameraMotion motion{};
-  Eigen::Matrix<double, 6, 6> covariance{Eigen::Matrix<double, 6, 6>::Zero()};  ///< in the tangent order of CameraMotion
+  Eigen::Matrix<double, 6, 6, Eigen::DontAlign> covariance{Eigen::Matrix<double, 6, 6>::Zero()};  ///< in the tangent order of CameraMotion
   PnpStatistics pnp{};
   MotionDifference difference{};  ///< from the prediction, where there was one
   double sigma_scale{1};

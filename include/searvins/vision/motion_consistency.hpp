@@ -57,7 +57,7 @@ struct ConsistencyOptions {
 /// What the inertial unit says of the camera's motion since the last frame, and how well it knows (tangent order of CameraMotion).
 struct PredictedMotion {
   CameraMotion motion{};
-  Eigen::Matrix<double, 6, 6> covariance{Eigen::Matrix<double, 6, 6>::Zero()};
+  Eigen::Matrix<double, 6, 6, Eigen::DontAlign> covariance{Eigen::Matrix<double, 6, 6>::Zero()};
 };
 
 /// How far two motions are apart, and how far they may be for `full`.
