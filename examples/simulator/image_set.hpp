@@ -48,10 +48,10 @@ enum class StampScale { gps, unix_utc };
 /// Renders the drive: call(time, seconds since the start, frame) for each picture in order of time.
 template <class Call>
 void for_each_frame(const Simulation& s, const RenderOptions& options, const Call& call) {
-  Renderer renderer(s.city(), s.way(), s.options().seed, options);
+  Renderer renderer(s.city(), s.way(), s.options().seed, options, s.real_rig());
   for (int k = 0; k < image_count(s.options()); ++k) {
     const double t_s = k / s.options().camera_rate_hz;
-    call(s.options().start.plus_seconds(t_s), t_s, renderer.frame(t_s, s.vehicle().state(t_s)));
+    call(s.options().start.plus_seconds(t_s), t_s, renderer.frame(t_s + s.options().camera_offset_s, s.at_exposure(t_s)));
   }
 }
 

@@ -289,10 +289,10 @@ class CameraRenderer {
 /// Renders the pair of a vehicle. One seed gives one city's looks; the noise of a frame depends on the seed and its time alone.
 class Renderer {
  public:
-  Renderer(const City& city, const std::vector<WayPoint>& way, std::uint64_t seed, const RenderOptions& options = {})
+  Renderer(const City& city, const std::vector<WayPoint>& way, std::uint64_t seed, const RenderOptions& options = {}, const StereoRig& rig = {})
       : options_(options),
         seed_(seed),
-        rig_(scaled_rig(StereoRig{}, options.width_px, options.height_px)),
+        rig_(scaled_rig(rig, options.width_px, options.height_px)),
         patterns_(PatternSet::drawn(seed)),
         sky_(seed),
         scene_(city, way, seed),

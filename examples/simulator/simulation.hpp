@@ -7,6 +7,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
@@ -38,6 +39,8 @@ struct SimulationOptions {
   double rover_rate_hz{1}, imu_rate_hz{100}, camera_rate_hz{10};
   ImuSampling imu_sampling{ImuSampling::instantaneous};
   ImuNoise imu_noise{};
+  double camera_offset_s{0};  ///< frames are exposed so much later than stamped
+  Eigen::Vector3d camera_boresight_rad{Eigen::Vector3d::Zero()};  ///< the camera is turned against rig.json, about its axes right, down, forward
   GpsTime start = gps_from_civil({2025, 6, 11, 4, 20, 0});
   Eigen::Vector3d origin_e_m = geodesy::ecef_from_geodetic({48.1 * std::numbers::pi / 180, 11.5 * std::numbers::pi / 180, 560});
   std::vector<GivenPoint> route{};  ///< in the East-North-Up frame of the origin; empty: streets are generated
@@ -96,7 +99,16 @@ class Simulation {
     return {std::move(plan), orbits_, options_.seed * 1000 + 12};
   }
   [[nodiscard]] ImuSensor imu() const { return {options_.imu_noise, options_.imu_rate_hz, options_.imu_sampling, stream(6)}; }
-  [[nodiscard]] StereoCamera camera() const { return {StereoRig{}, city_, landmarks_, stream(7)}; }
+  [[nodiscard]] StereoCamera camera() const { return {real_rig(), city_, landmarks_, stream(7)}; }
+  /// The camera as it is mounted; rig.json describes StereoRig{}.
+  [[nodiscard]] StereoRig real_rig() const {
+    StereoRig rig;
+    const Eigen::Vector3d& turn = options_.camera_boresight_rad;
+    if (turn.norm() > 0) rig.R_bc = rig.R_bc * Eigen::AngleAxisd{turn.norm(), turn.normalized()}.toRotationMatrix();
+    return rig;
+  }
+  /// The vehicle when the frame with the stamp `t_s` was exposed.
+  [[nodiscard]] VehicleState at_exposure(double t_s) const { return vehicle_.state(t_s + options_.camera_offset_s); }
 
   /// The broadcast records of the satellites that are up at some time: one every two hours.
   [[nodiscard]] std::vector<Orbit> records() const {

@@ -23,7 +23,7 @@ void add_frames(const simulator::Simulation& drive, InertialDrive& d) {
   for (int k = 0; k <= static_cast<int>(drive.options().duration_s * 10); ++k) {
     auto& frame = d.frames.emplace_back();
     frame.time = d.start.plus_seconds(k / 10.0);
-    for (const simulator::TrackObservation& o : camera.frame(drive.vehicle().state(k / 10.0))) {
+    for (const simulator::TrackObservation& o : camera.frame(drive.at_exposure(k / 10.0))) {
       vision::StereoObservation seen;
       seen.track = static_cast<std::uint64_t>(o.track), seen.score = o.score;
       seen.pixel_px = {o.u_left_px, o.u_right_px, o.v_px};
@@ -35,6 +35,7 @@ void add_frames(const simulator::Simulation& drive, InertialDrive& d) {
 
 InertialDrive made(simulator::SimulationOptions options, const DriveRates& rates) {
   options.rover_rate_hz = rates.rover_hz, options.imu_rate_hz = rates.imu_hz;
+  options.camera_offset_s = rates.camera_offset_s, options.camera_boresight_rad = rates.camera_boresight_rad;
   const double duration_s = options.duration_s;
   if (rates.kind == imu::SampleKind::mean_to_stamp) options.imu_sampling = simulator::ImuSampling::mean_to_stamp;
   const auto drive = std::make_shared<const simulator::Simulation>(options);

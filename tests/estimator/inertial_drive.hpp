@@ -53,6 +53,8 @@ struct DriveRates {
   double rover_hz{1}, imu_hz{100};
   imu::SampleKind kind{imu::SampleKind::instantaneous};
   bool has_frames{false};  ///< stereo tracks at 10 Hz
+  double camera_offset_s{0};                                      ///< frames are exposed so much later than stamped
+  Eigen::Vector3d camera_boresight_rad{Eigen::Vector3d::Zero()};  ///< the camera is turned against InertialDrive::camera
 };
 
 /// A simulated drive: 20 s of standing, then streets. Profiles: open, light, urban.

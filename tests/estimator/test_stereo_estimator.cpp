@@ -124,6 +124,25 @@ TEST_CASE("thirty seconds without GNSS: frames bound the drift of the unit, and 
   CHECK(of_frames > 600);
 }
 
+TEST_CASE("reprojection in the left view alone: depth comes from motion, and the drift of the unit is bounded all the same") {
+  const InertialDrive& d = drive();
+  StereoUnderTest::Options left = stereo_options(d);
+  left.inertial.stereo.eyes = vision::Eyes::left;
+  const StereoRun one = run_with(d, left, true), blind = run_with(d, stereo_options(d), false);
+  const DriveScore by_one = score_epochs(d, one, kFrom, kTo), by_two = score_epochs(d, seeing(), kFrom, kTo), by_none = score_epochs(d, blind, kFrom, kTo),
+                   later = score_epochs(d, one, kTo + 3, kEnd);
+  char line[240];
+  std::snprintf(line, sizeof line, "horizontal error, largest: by no eye %.2f m, one %.2f m (mean nees %.1f), two %.2f m; dropped as moving %ld", by_none.max_m,
+                by_one.max_m, by_one.mean_nees(), by_two.max_m, one.dropped_landmarks);
+  MESSAGE(line);
+  check_order(one);
+  CHECK(one.errors == 0);
+  CHECK(by_one.max_m < by_none.max_m);
+  CHECK(by_one.mean_nees() < 10);
+  CHECK(numbers_of(one) != numbers_of(seeing()));
+  CHECK(later.max_m < 0.1);
+}
+
 TEST_CASE("with GNSS all the time frames disturb no fix, and every epoch is answered") {
   const InertialDrive& d = drive();
   const StereoRun run = run_with(d, stereo_options(d), true, {.rover_in_gap = true});

@@ -95,6 +95,38 @@ TEST_CASE("the residual is the whitened difference of pixels, and vanishes where
   });
 }
 
+TEST_CASE("by the left eye: as with a right pixel of which nothing is known, and two views of a point tell its depth") {
+  for_all_seeds(100, [](Rng& rng) {
+    Scene s = scene(rng, uniform(rng, 1, 60));
+    const Eigen::Vector3d seen = *s.camera.project(s.p_c_m);
+    const Eigen::Matrix3d Sigma = 0.5 * random_spd(rng, 3, 20);
+    const double scale = uniform(rng, 1, 4);
+    Eigen::Matrix3d blind = Sigma;
+    blind(1, 1) += 1e8;
+    const Eigen::Vector3d pixel = seen + random_vector<3>(rng, 3);
+    const auto left = StereoFactor<>::make(s.state, s.landmark, s.camera, pixel, Sigma, scale, {}, vision::Eyes::left);
+    const auto both = StereoFactor<>::make(s.state, s.landmark, s.camera, pixel, blind, scale);
+    REQUIRE((left.ok() && both.ok()));
+    CHECK(close(left->root_information.transpose() * left->root_information, both->root_information.transpose() * both->root_information, 1e-5));
+    CHECK(left->root_information.row(1).isZero(0));
+    CHECK(left->root_information.col(1).isZero(0));
+    CHECK(jacobian_error(*left, s, 1e-5) < 1e-5);
+    // From another place: the block of the landmark is regular by two such observations, by one it is not.
+    const auto block = [&](const auto& f) {
+      double e[3]{};
+      Matrix3x18 J = Matrix3x18::Zero();
+      f->linearise(s.values, e, {J.data(), 3});
+      const Eigen::Matrix3d Jl = J.rightCols<3>();
+      return Eigen::Matrix3d{Jl.transpose() * Jl};
+    };
+    const Eigen::Matrix3d one = block(left);
+    s.values.at(s.state).p_wb_m += s.values.at(s.state).R_wb * s.camera.R_bc * Eigen::Vector3d{0.2 * s.p_c_m.z(), 0, 0};
+    const Eigen::Matrix3d two = one + block(left);
+    CHECK(std::abs(one.determinant()) < 1e-6 * std::abs(two.determinant()));
+    CHECK(two.determinant() > 0);
+  });
+}
+
 TEST_CASE("the Jacobian is that of the residual, in front of the camera and behind it") {
   for_all_seeds(200, [](Rng& rng) {
     const double depth = chance(rng, 0.6) ? uniform(rng, 1, 60) : uniform(rng, -30, 0.05);

@@ -6,6 +6,8 @@
 ///     e   = R (pi_s(p_c) - z)       R' R = (s^2 Sigma)^-1, Sigma of z = (uL, uR, v), s the scale from PnP's support
 ///     rho(|e|) under Huber          an observation is one decision, so its three rows share a weight
 ///
+/// By one eye (Eyes::left) the row of uR is zero, and R' R the information of (uL, v) alone: depth then comes from the motion between frames.
+///
 /// With P = d pi_s / d p_c (stereo_camera.hpp) and A = R P R_bc',
 ///
 ///     d e / d theta = A [p_b]x        d e / d p_wb = -A R_wb'        d e / d l = A R_wb'
@@ -32,6 +34,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <type_traits>
 
 #include <searvins/core/status.hpp>
@@ -47,6 +50,9 @@ namespace searvins::vision {
 
 /// Noise of an observation with the same sigma, independent, on uL, uR and v.
 [[nodiscard]] inline Eigen::Matrix3d pixel_covariance_px2(double sigma_px) { return sigma_px * sigma_px * Eigen::Matrix3d::Identity(); }
+
+/// Which pixels of an observation count.
+enum class Eyes : std::uint8_t { both, left };
 
 /// See the file comment.
 template <robust::Loss Loss = robust::Huber<double>>
@@ -70,11 +76,13 @@ struct StereoFactor {
   Loss loss{};
   double tangent_below_m{0};  ///< z_t
 
-  /// `covariance_px2`: Sigma. `support_scale`: s >= 1 of the frame's PnP, 1 where it was well supported.
+  /// `covariance_px2`: Sigma. `support_scale`: s >= 1 of the frame's PnP, 1 where it was well supported. By the left eye alone, uR says but where
+  /// pi_s is continued from.
   /// Errors: invalid_argument (scale), non_finite (pixel), not_positive_definite (covariance, also NaN).
   [[nodiscard]] static Result<StereoFactor> make(const smoother::Key<State>& state, const smoother::Key<Landmark>& landmark,
                                                  const StereoCamera<double>& camera, const StereoPixel<double>& pixel,
-                                                 const Eigen::Matrix3d& covariance_px2, double support_scale = 1, const Loss& loss = {}) {
+                                                 const Eigen::Matrix3d& covariance_px2, double support_scale = 1, const Loss& loss = {},
+                                                 Eyes eyes = Eyes::both) {
     if (!(support_scale >= 1) || !std::isfinite(support_scale))
       return failure(StatusCode::invalid_argument, "scale of a stereo observation's sigma must be 1 or more", -1, -1, support_scale);
     if (!pixel.allFinite()) return failure(StatusCode::non_finite, "stereo observation with a NaN or infinity");
@@ -83,7 +91,8 @@ struct StereoFactor {
     const double sigma_px =
         support_scale * std::sqrt(covariance_px2(0, 0) + covariance_px2(1, 1) - covariance_px2(0, 1) - covariance_px2(1, 0));
     const double nearest_px = 2 * std::max(pixel[0] - pixel[1], 0.0) + kGrossSigmas * sigma_px;
-    return StereoFactor{state, landmark, camera, pixel, *root / support_scale, loss, camera.depth_m(nearest_px)};
+    const Eigen::Matrix3d rows = eyes == Eyes::both ? *root : left_root_information(covariance_px2);
+    return StereoFactor{state, landmark, camera, pixel, rows / support_scale, loss, camera.depth_m(nearest_px)};
   }
 
   [[nodiscard]] int rows() const { return 3; }
@@ -95,14 +104,14 @@ struct StereoFactor {
   void evaluate(const Values& values, double* e) const {
     const State& x = values(state);
     const Eigen::Vector3d p_b = x.R_wb.transpose() * (values(landmark).p_w_m - x.p_wb_m);
-    whiten(camera.continued(camera.camera_from_body(p_b), nullptr, tangent_below_m), e);
+    whiten(camera.camera_from_body(p_b), nullptr, e);
   }
   template <class Values>
   void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
     const State& x = values(state);
     const Eigen::Vector3d p_b = x.R_wb.transpose() * (values(landmark).p_w_m - x.p_wb_m);
     Eigen::Matrix3d P;
-    whiten(camera.continued(camera.camera_from_body(p_b), &P, tangent_below_m), e);
+    whiten(camera.camera_from_body(p_b), &P, e);
     const Eigen::Matrix3d A = root_information * (P * camera.R_bc.transpose());
     const Eigen::Matrix3d d_landmark = A * x.R_wb.transpose(), d_attitude = A * so3::skew(p_b);
     for (int c = 0; c < 3; ++c)
@@ -117,10 +126,19 @@ struct StereoFactor {
     std::fill_n(w, 3, loss.weight(z2));
     return loss.rho(z2);
   }
+  /// e of a landmark at p_c in camera axes and, if asked, d pi_s / d p_c.
+  void whiten(const Eigen::Vector3d& p_c_m, Eigen::Matrix3d* d_p_c, double* e) const {
+    Eigen::Map<Eigen::Vector3d>{e} = root_information * (camera.continued(p_c_m, d_p_c, tangent_below_m) - pixel);
+  }
 
  private:
-  void whiten(const StereoPixel<double>& predicted, double* e) const {
-    Eigen::Map<Eigen::Vector3d>{e} = root_information * (predicted - pixel);
+  /// R of (uL, v) in the rows and columns of uL and v: the factor of [a b; b c], inverted.
+  [[nodiscard]] static Eigen::Matrix3d left_root_information(const Eigen::Matrix3d& covariance_px2) {
+    const double a = covariance_px2(0, 0), b = covariance_px2(2, 0), c = covariance_px2(2, 2);
+    const double root_c = std::sqrt(c), root_a = std::sqrt(a - b * b / c);
+    Eigen::Matrix3d R = Eigen::Matrix3d::Zero();
+    R(0, 0) = 1 / root_a, R(0, 2) = -b / (c * root_a), R(2, 2) = 1 / root_c;
+    return R;
   }
 };
 
