@@ -45,7 +45,7 @@ solve_drive() {
   done
   solve_one stereo_from_pictures --imu "$drive/imu.csv" --rig "$drive/rig_images.json" --images "$drive"
   echo "The rows of the paper in the tables are of its own drive, 20 km of downtown streets: for scale, not for comparison."
-  "$searvins" evaluate --truth "$drive/truth.csv" --start 274800 --end 274860 --paper --report "$out/drive.html" \
+  "$searvins" evaluate --truth "$drive/truth.csv" --start 274800 --end 274860 --paper --streets "$drive/streets.csv" --report "$out/drive.html" \
     "GNSS=$runs/GNSS" "GNSS+IMU=$runs/GNSS+IMU" "stereo scalar=$runs/stereo_scalar" "stereo latent=$runs/stereo_latent" \
     "stereo symmetric=$runs/stereo_symmetric" "stereo from pictures=$runs/stereo_from_pictures"
 }

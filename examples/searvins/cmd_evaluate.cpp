@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include <searvins/io/centreline_file.hpp>
+
 #include "examples/searvins/commands.hpp"
 #include "examples/support/assessment.hpp"
 #include "examples/support/compare_report.hpp"
@@ -32,6 +34,7 @@ OptionParser evaluate_parser() {
   parser.value("alert-limit", "M", "largest horizontal error that the application bears, metres").fallback("1.5");
   parser.value("report", "FILE",
                "a page that lays the runs over one another: tables, tracks, errors over time, distributions, Stanford diagrams");
+  parser.value("streets", "FILE", "lines to draw below the tracks of the --report: rows line,lat_deg,lon_deg,height_m");
   parser.value("tables", "FILE", "the paper's tables as FILE.csv or FILE.md").repeated();
   parser.value("json", "FILE", "all figures, the wrong fixes one by one");
   parser.positionals("RUN", "folder of a run, trajectory.csv, or RTKLIB .pos file; NAME=RUN names it", 1);
@@ -111,6 +114,11 @@ io::Diagnostic write_files(const Options& options, const std::vector<PaperTableR
   }
   if (const std::string path = options.text("report"); !path.empty()) {
     Comparison comparison;
+    if (const std::string streets = options.text("streets"); !streets.empty()) {
+      io::FileResult<std::vector<imu::CentrelinePoint>> points = io::read_centrelines(streets);
+      if (!points) return points.error();
+      comparison.streets = std::move(points).value();
+    }
     comparison.title = title_of(runs), comparison.command = command, comparison.table = table, comparison.runs = std::move(runs);
     if (std::string wrong = io::write_text_file(path, compare_html(comparison)); !wrong.empty())
       return {path, 0, std::move(wrong), "choose another file with --report"};
@@ -136,6 +144,7 @@ int run_evaluate(int argc, const char* const* argv) {
     options.fail("--end lies before --start");
   for (const std::string& path : options.texts("tables"))
     if (!path.ends_with(".csv") && !path.ends_with(".md")) options.fail("--tables: " + path + " ends neither with .csv nor with .md");
+  if (options.given("streets") && !options.given("report")) options.fail("--streets are drawn into the page of --report FILE");
   if (const auto code = options.finished()) return *code;
 
   std::vector<AssessedRun> runs;

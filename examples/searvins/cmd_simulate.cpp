@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -179,16 +180,23 @@ int run_simulate(int argc, const char* const* argv) {
   parser.value("rover-rate", "HZ", "rate of the rover's receiver").one_of({"1", "2", "5", "10"}).fallback("1");
   parser.value("imu-sample", "KIND", "what an IMU row stands for").one_of({"instantaneous", "mean_to_stamp"}).fallback("instantaneous");
   parser.value("images", "WxH", "also render pictures of this size, EuRoC layout, for example 640x240 (about 15 a second)");
+  parser.value("camera-offset-ms", "MS", "frames are exposed so many milliseconds later than stamped").fallback("0");
+  parser.value("camera-boresight-deg", "X,Y,Z", "the camera is turned against rig.json, degrees about its axes right, down, forward");
   parser.epilogue("Nothing in the files was recorded. labels.csv holds the truth about every signal; do not use it to solve.");
   Options options = parser.parse(argc, argv);
   sim::SimulationOptions wanted;
   if (options.given("duration")) wanted.duration_s = options.number("duration", 10, 21600);
   const double seed = options.number("seed", 0, 1e9), rate = options.number("rover-rate", 1, 10);
+  const double offset_ms = options.number("camera-offset-ms", -100, 100);
+  const std::vector<double> boresight_deg = options.numbers("camera-boresight-deg", 3);
   const auto images = options.given("images") ? image_size(options) : std::nullopt;
   if (const auto code = options.finished()) return *code;
 
   wanted.profile = options.text("profile"), wanted.seed = static_cast<std::uint64_t>(seed), wanted.rover_rate_hz = rate;
   wanted.imu_sampling = options.text("imu-sample") == "mean_to_stamp" ? sim::ImuSampling::mean_to_stamp : sim::ImuSampling::instantaneous;
+  wanted.camera_offset_s = offset_ms / 1000;
+  for (std::size_t i = 0; i < boresight_deg.size(); ++i)
+    wanted.camera_boresight_rad[static_cast<Eigen::Index>(i)] = boresight_deg[i] * std::numbers::pi / 180;
   std::vector<gnss::Ephemeris> records;
   if (options.given("nav")) {
     auto read = read_records(options.text("nav"));

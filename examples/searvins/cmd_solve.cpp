@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // `searvins solve`: recordings in, trajectory and report out.
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -18,15 +19,19 @@ namespace {
 OptionParser solve_parser() {
   OptionParser parser{"searvins solve", "positions of a GNSS antenna, alone or with an inertial unit, from recordings"};
   parser.value("rover", "FILE", "RINEX observation file of the moving receiver");
-  parser.value("base", "FILE", "RINEX observation file of the base station; without it single points are computed");
+  parser.value("base", "FILE", "RINEX observation file of the base station; without it single points, or with --imu codes and Doppler shifts of the rover alone");
   parser.value("nav", "FILE", "RINEX navigation file").repeated();
   parser.value("out", "DIR", "folder for the results, made when it is missing").required();
   parser.value("rig", "FILE", "rig.json: signals, sigmas, base position, inertial unit, lever arm");
-  parser.value("imu", "FILE", "log of the inertial unit that --rig describes: tightly coupled, a solution through outages");
+  parser.value("imu", "FILE", "log of the inertial unit that --rig describes: tightly coupled, with or without a base, a solution through outages");
   parser.value("positions", "FILE", "another program's positions (.pos, or week,sow,x,y,z[,sd..]) instead of --rover, --base and --nav: loosely coupled");
   parser.value("tracks", "FILE", "stereo tracks of a frontend, pixels of the rectified pair that --rig describes; with --imu");
   parser.value("images", "DIR", "stereo pictures in the EuRoC layout (cam0, cam1, labels0) instead of --tracks: the reference frontend finds and follows points");
-  parser.value("without", "LIST", "parts of the screening of tracks to switch off: semantic, geometric, motion, maturity");
+  parser.value("without", "LIST", "parts to switch off: semantic, geometric, motion, maturity of the screening of tracks; stereo, right pixels as measurements; robust, the weights of GNSS");
+  parser.value("with", "LIST",
+               "policies that are off by default: wheels (no sliding, with --imu), cn0 (codes of weak signals count less), code-gate (codes 5 sigmas off the "
+               "prediction are left out), batch-size (batch weights by the mean square of a batch)");
+  parser.flag("calibrate-camera", "also estimate the time offset and the boresight of the camera (docs/vision.md); --robust symmetric");
   parser.value("heading", "DEG[,SIGMA]", "heading at the start, clockwise from north, and its sigma; else found from the motion");
   parser.value("base-ecef", "X,Y,Z", "antenna of the base, ECEF metres; else the rig's, else that of the base file's header");
   parser.value("robust", "FORM", "robust formulation").fallback(kDefaultFormulation).one_of({"batch", "scalar", "latent", "symmetric"});
@@ -85,17 +90,33 @@ void check_rate(Options& options) {
   if (rate != "gnss" && rate != "camera" && rate != "imu") options.fail("--rate: '" + rate + "' is none of gnss, camera, imu");
 }
 
+/// What is switched off and on.
+void take_policies(Options& options, SolveRequest& request, bool is_dataset) {
+  const auto is_one_of = [](const auto& names, const std::string& name) { return std::find(names.begin(), names.end(), name) != names.end(); };
+  request.without = options.list("without"), request.with = options.list("with");
+  for (const std::string& part : request.without) {
+    if (part == kRobustPart) continue;
+    if (!is_one_of(kScreeningParts, part)) options.fail("--without: '" + part + "' is none of semantic, geometric, motion, maturity, stereo, robust");
+    if (!request.has_camera() && !is_dataset) options.fail("--without " + part + " needs --tracks FILE or --images DIR");
+  }
+  for (const std::string& policy : request.with)
+    if (!is_one_of(kPolicies, policy)) options.fail("--with: '" + policy + "' is none of wheels, cn0, code-gate, batch-size");
+  if (is_one_of(request.with, "wheels") && request.imu.empty() && !is_dataset) options.fail("--with wheels needs --imu FILE");
+  if (is_one_of(request.with, "batch-size") && options.text("robust") != "batch") options.fail("--with batch-size needs --robust batch");
+}
+
 /// Options of the inertial unit, and what each of them needs.
 void take_imu(Options& options, SolveRequest& request) {
   request.imu = options.text("imu");
   const bool is_dataset = options.given("dataset");  // what is not named is in its folder
   request.at_imu_rate = options.text("rate") == "imu", request.at_camera_rate = options.text("rate") == "camera";
-  request.tracks = options.text("tracks"), request.images = options.text("images"), request.without = options.list("without");
-  for (const std::string& part : request.without)
-    if (part != "semantic" && part != "geometric" && part != "motion" && part != "maturity")
-      options.fail("--without: '" + part + "' is none of semantic, geometric, motion, maturity");
-  if (!request.without.empty() && !request.has_camera() && !is_dataset) options.fail("--without needs --tracks FILE or --images DIR");
+  request.tracks = options.text("tracks"), request.images = options.text("images");
+  take_policies(options, request, is_dataset);
   if (!request.tracks.empty() && !request.images.empty()) options.fail("give either --tracks FILE or --images DIR");
+  request.calibrate_camera = options.flag("calibrate-camera");
+  if (request.calibrate_camera && !request.has_camera() && !is_dataset) options.fail("--calibrate-camera needs --tracks FILE or --images DIR");
+  if (request.calibrate_camera && options.text("robust") != kCalibratingFormulation)
+    options.fail(std::string{"--calibrate-camera needs --robust "} + kCalibratingFormulation);
   if (options.given("heading")) {
     const std::vector<double> heading = options.numbers("heading", options.list("heading").size() == 2 ? 2 : 1);
     if (!heading.empty()) request.heading_deg = heading[0];
@@ -111,8 +132,6 @@ void take_imu(Options& options, SolveRequest& request) {
     return;
   }
   if (request.rig.empty()) options.fail("--imu needs --rig FILE: the axes and noise of the unit, and where the antenna is");
-  if (request.base.empty() && request.positions.empty())
-    options.fail("--imu needs --base FILE: the tightly coupled estimator works with differences; or --positions FILE, loosely coupled");
 }
 
 /// Where the measurements come from: a rover with its ephemerides, or positions of another program.
@@ -143,7 +162,7 @@ void check_dataset(Options& options) {
   for (const char* name : {"imu", "positions"})
     if (options.given(name)) options.fail(std::string{"--dataset is given: leave --"} + name + " out");
   const std::string sensors = options.text("sensors");
-  for (const char* name : {"tracks", "images", "without"})
+  for (const char* name : {"tracks", "images", "without", "calibrate-camera"})
     if (options.given(name) && sensors != "all") options.fail(std::string{"--"} + name + " needs --sensors all");
   if (options.text("rate") == "camera" && sensors != "all") options.fail("--rate camera needs --sensors all");
   if ((options.text("rate") == "imu" || options.given("heading")) && sensors == "gnss")

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// \file
-/// SolverRun of one formulation, with and without an inertial unit. Included by the four solve_*.cpp only: instantiating it is what takes
+/// SolverRun of one formulation, with and without an inertial unit. Included by the five solve_*.cpp only: instantiating it is what takes
 /// the compiler's time.
 #pragma once
 
@@ -31,11 +31,27 @@ template <class Estimator>
 
 }  // namespace detail
 
+/// The robust policies of a formulation.
+template <template <class> class Form>
+struct Policies {
+  Form<robust::Dcs<double>> code_phase{};
+  Form<robust::Huber<double>> doppler{};
+};
+
+/// Those that the options ask for. Without robustness the thresholds are where no residual comes.
+template <template <class> class Form>
+[[nodiscard]] Policies<Form> policies_of(const RunOptions& options) {
+  Policies<Form> p;
+  if (!options.robust) p.code_phase.loss.c = p.doppler.loss.k = 1e12;
+  if constexpr (requires { p.code_phase.normalise_by_size; }) p.code_phase.normalise_by_size = p.doppler.normalise_by_size = options.batch_by_size;
+  return p;
+}
+
 /// An RtkEstimator behind the interface. Tens of megabytes: lives on the heap.
 template <template <class> class Form>
 class RtkRun final : public EpochRun {
  public:
-  explicit RtkRun(const estimator::RtkOptions& options) : estimator_(options) {}
+  RtkRun(const estimator::RtkOptions& options, const Policies<Form>& policies) : estimator_(options, policies.code_phase, policies.doppler) {}
 
   Status add_ephemeris(const gnss::Ephemeris& ephemeris) override { return estimator_.add_ephemeris(ephemeris); }
   void set_ionosphere(const gnss::KlobucharCoefficients& coefficients) override { estimator_.set_ionosphere(coefficients); }
@@ -53,10 +69,10 @@ class RtkRun final : public EpochRun {
 };
 
 /// The tightly coupled Estimator behind the interface, with a camera where frames come. Some hundred megabytes: lives on the heap.
-template <template <class> class Form>
+template <template <class> class Form, class Motion = estimator::StereoInertialMotion<>>
 class InertialRun final : public SolverRun {
  public:
-  explicit InertialRun(const RunOptions& options) : estimator_(whole(options)) {}
+  InertialRun(const RunOptions& options, const Policies<Form>& policies) : estimator_(whole(options), policies.code_phase, policies.doppler) {}
 
   Status add_ephemeris(const gnss::Ephemeris& ephemeris) override { return estimator_.add_ephemeris(ephemeris); }
   void set_ionosphere(const gnss::KlobucharCoefficients& coefficients) override { estimator_.set_ionosphere(coefficients); }
@@ -82,7 +98,9 @@ class InertialRun final : public SolverRun {
   }
   [[nodiscard]] std::optional<StereoReport> stereo() const override {
     const auto& motion = estimator_.inertial().motion();
-    return StereoReport{motion.counts(), motion.dropped_landmarks(), estimator_.refused_frames(), estimator_.frame_status().what};
+    StereoReport report{motion.counts(), motion.dropped_landmarks(), estimator_.refused_frames(), estimator_.frame_status().what, std::nullopt};
+    if constexpr (Motion::Camera::calibrates) report.correction = motion.camera().estimate();
+    return report;
   }
   [[nodiscard]] std::optional<ScreenedFrame> screened() const override {
     const auto& motion = estimator_.inertial().motion();
@@ -93,7 +111,7 @@ class InertialRun final : public SolverRun {
   }
 
  private:
-  using Whole = estimator::Estimator<Form, estimator::StereoCapacity, estimator::StereoInertialMotion<>>;
+  using Whole = estimator::Estimator<Form, estimator::StereoCapacity, Motion>;
 
   [[nodiscard]] static typename Whole::Options whole(const RunOptions& options) {
     typename Whole::Options o;
@@ -107,8 +125,8 @@ class InertialRun final : public SolverRun {
 /// The run that the options ask for.
 template <template <class> class Form>
 [[nodiscard]] std::unique_ptr<SolverRun> make_run_of(const RunOptions& options) {
-  if (options.inertial) return std::make_unique<InertialRun<Form>>(options);
-  return std::make_unique<RtkRun<Form>>(options.rtk);
+  if (options.inertial) return std::make_unique<InertialRun<Form>>(options, policies_of<Form>(options));
+  return std::make_unique<RtkRun<Form>>(options.rtk, policies_of<Form>(options));
 }
 
 }  // namespace searvins::examples

@@ -252,7 +252,18 @@ Failure take_unit(const SolveRequest& request, const Rig& rig, SolveInputs& in) 
   const bool is_mean = rig.imu->sample == RigImu::Sample::mean_to_stamp;
   inertial.preintegration.kind = is_mean ? imu::SampleKind::mean_to_stamp : imu::SampleKind::instantaneous;
   inertial.lever_arm_b_m = rig.R_rfu_b * *rig.lever_arm_b_m;
+  inertial.non_holonomic = std::find(request.with.begin(), request.with.end(), "wheels") != request.with.end();
   return {};
+}
+
+constexpr double kCodeGateSigmas = 5;
+
+/// Policies of --with that GNSS alone has.
+void take_policies(const SolveRequest& request, SolveInputs& in) {
+  for (const std::string& policy : request.with) {
+    if (policy == "cn0") in.options.differencing.cn0_weighting = true;
+    if (policy == "code-gate") in.options.code_gate_sigmas = kCodeGateSigmas;
+  }
 }
 
 /// The rectified pair that the rig describes.
@@ -308,6 +319,7 @@ Failure take_camera(const SolveRequest& request, const Rig& rig, SolveInputs& in
     if (part == "geometric") a.use_geometric = false;
     if (part == "motion") a.use_motion = false;
     if (part == "maturity") a.use_maturity = false;
+    if (part == "stereo") in.inertial->stereo.eyes = vision::Eyes::left;
   }
   in.image_options.semantic = a.semantic;
   return {};
@@ -417,6 +429,7 @@ io::FileResult<SolveInputs> prepare(const SolveRequest& request) {
     in.base = std::move(base).value();
   }
   take_screening(request, rig.gnss, in);
+  take_policies(request, in);
   if (const Failure f = take_times(request, in)) return *f;
   if (const Failure f = take_base_position(request, rig, in)) return *f;
   if (const Failure f = take_signals(request, rig.gnss, in)) return *f;

@@ -80,8 +80,9 @@ constexpr std::size_t kCodeFates = 6;
 /// Collects the diagnostics of the epochs.
 class Collector {
  public:
-  Collector(SolveOutcome& out, bool with_base) : out_(out), with_base_(with_base) {
-    if (with_base) {
+  /// `differences`: the estimator screens signals as differencing does, be it without a base.
+  Collector(SolveOutcome& out, bool with_base, bool differences) : out_(out), with_base_(with_base), differences_(differences) {
+    if (differences) {
       for (std::size_t r = 0; r < gnss::kRejections; ++r)
         out.rejection_reasons.emplace_back(gnss::name_of(static_cast<gnss::Rejection>(r)));
       out.fix_outcomes.emplace_back("fixed");
@@ -102,7 +103,7 @@ class Collector {
     take_motion(s, epoch);
     epoch.rejected.assign(out_.rejection_reasons.size(), 0);
     epoch.base_age_s = s.base_age_s;
-    if (differenced)
+    if (differenced && differences_)
       take_differences(*differenced, s, epoch);
     else
       take_codes(run.single_point(), epoch);
@@ -110,13 +111,10 @@ class Collector {
     out_.released_integers += s.released_integers;
     out_.restarts += s.restarted && out_.rows.size() > 1;
     if (!s.smoother_status.ok()) add_count(out_.incidents, std::string{"optimisation: "} + s.smoother_status.what);
-    const bool differences_used = s.status != estimator::SolutionStatus::spp && s.status != estimator::SolutionStatus::dr;
     if (satellites_seen < 0)
       add_count(out_.incidents, "no rover epoch: carried on by the inertial unit");
-    else if (differenced && !differenced->base_status.ok())
-      add_count(out_.incidents, std::string{"no differences: "} + differenced->base_status.what);
-    else if (with_base_ && !differences_used)
-      add_count(out_.incidents, "no differences: too few satellites in common with the base");
+    else if (with_base_)
+      take_missing_differences(s, differenced);
     if (out_.rows.size() == 1 || seconds_between(last_sky_, s.tag) >= kSkyStepS) take_sky(run.single_point(), differenced, s.tag);
   }
 
@@ -141,6 +139,13 @@ class Collector {
   }
 
  private:
+  /// Counts an epoch that the base said nothing of, and why.
+  void take_missing_differences(const estimator::RtkSolution& s, const gnss::DifferencedEpoch* differenced) {
+    if (differenced && !differenced->base_status.ok())
+      add_count(out_.incidents, std::string{"no differences: "} + differenced->base_status.what);
+    else if (s.status == estimator::SolutionStatus::spp || s.status == estimator::SolutionStatus::dr)
+      add_count(out_.incidents, "no differences: too few satellites in common with the base");
+  }
   void take_differences(const gnss::DifferencedEpoch& d, const estimator::RtkSolution& s, ReportEpoch& epoch) const {
     for (std::size_t r = 0; r < gnss::kRejections; ++r) epoch.rejected[r] = d.rejected[r];
     double sum = 0;
@@ -158,7 +163,7 @@ class Collector {
     int n = 0;
     for (const gnss::CodeRow& row : s.rows) {
       if (row.fate == gnss::CodeFate::used && std::isfinite(row.cn0_dbhz)) sum += row.cn0_dbhz, ++n;
-      if (row.fate != gnss::CodeFate::used && !with_base_) ++epoch.rejected[static_cast<std::size_t>(row.fate) - 1];
+      if (row.fate != gnss::CodeFate::used && !differences_) ++epoch.rejected[static_cast<std::size_t>(row.fate) - 1];
     }
     if (n > 0) epoch.mean_cn0_dbhz = sum / n;
   }
@@ -184,7 +189,7 @@ class Collector {
   }
 
   SolveOutcome& out_;
-  bool with_base_;
+  bool with_base_, differences_;
   std::map<std::string, ReportSatellite> sky_;
   GpsTime last_sky_{};
   std::optional<LaggedEstimate> pending_;
@@ -280,7 +285,7 @@ void score(const SolveRequest& request, const SolveInputs& in, SolveOutcome& out
 class Drain {
  public:
   Drain(const SolveInputs& in, bool at_camera_rate, SolverRun& run, SolveOutcome& out)
-      : in_(in), run_(run), out_(out), collector_(out, in.base.has_value()), watch_(in.start, out), at_camera_rate_(at_camera_rate) {}
+      : in_(in), run_(run), out_(out), collector_(out, in.base.has_value(), in.base || (in.inertial && in.positions.empty())), watch_(in.start, out), at_camera_rate_(at_camera_rate) {}
 
   void add_rover(const gnss::ObservationEpoch& epoch) {
     ++out_.rover_epochs;
@@ -519,10 +524,21 @@ io::FileResult<bool> feed(const SolveRequest& request, const SolveInputs& in, Me
 
 }  // namespace
 
+namespace {
+
+RunOptions run_options(const SolveRequest& request, const SolveInputs& in) {
+  const auto names = [](const std::vector<std::string>& list, const char* name) { return std::find(list.begin(), list.end(), name) != list.end(); };
+  RunOptions o{.rtk = in.options, .inertial = in.inertial, .calibrate_camera = request.calibrate_camera};
+  o.robust = !names(request.without, kRobustPart), o.batch_by_size = names(request.with, "batch-size");
+  return o;
+}
+
+}  // namespace
+
 io::FileResult<SolveOutcome> solve(const SolveRequest& request, const SolveInputs& in) {
   SolveOutcome out;
   const std::unique_ptr<SolverRun> run =
-      in.base || in.inertial ? make_run(request.formulation, {in.options, in.inertial}) : make_single_point_run(in.options);
+      in.base || in.inertial ? make_run(request.formulation, run_options(request, in)) : make_single_point_run(in.options);
   if (!run)
     return io::Diagnostic{"--robust", 0, "'" + request.formulation + "' is no formulation", "use batch, scalar, latent or symmetric"};
   for (const gnss::Ephemeris& e : in.ephemerides)

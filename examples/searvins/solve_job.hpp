@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -32,6 +33,12 @@ namespace searvins::examples {
 /// The sigmas that `--sigma-profile` falls back to: the estimator's own.
 inline constexpr const char* kDefaultSigmaProfile = "general";
 
+/// Parts that `--without` switches off: of the screening of tracks, and the robust weights of GNSS.
+inline constexpr std::array kScreeningParts{"semantic", "geometric", "motion", "maturity", "stereo"};
+inline constexpr const char* kRobustPart = "robust";
+/// Policies that `--with` switches on.
+inline constexpr std::array kPolicies{"wheels", "cn0", "code-gate", "batch-size"};
+
 /// What was asked for.
 struct SolveRequest {
   std::string rover, base;  ///< RINEX observation files; no base: single points
@@ -45,7 +52,9 @@ struct SolveRequest {
   std::string positions{};                 ///< another program's positions, instead of rover, base and nav: loosely coupled
   std::string tracks{};                    ///< stereo tracks of a frontend, with an inertial unit
   std::string images{};                    ///< folder of stereo pictures, instead of tracks: the reference frontend makes them
-  std::vector<std::string> without{};      ///< parts of the screening of tracks that are switched off
+  std::vector<std::string> without{};      ///< parts that are switched off: of the screening of tracks, or kRobustPart
+  std::vector<std::string> with{};         ///< policies that are off by default: kPolicies
+  bool calibrate_camera{false};            ///< time offset and boresight of the camera are estimated
   std::optional<double> heading_deg{};     ///< at the beginning, from elsewhere
   double heading_sigma_deg{5};
   bool at_imu_rate{false};                 ///< rows between the solutions, one a reading

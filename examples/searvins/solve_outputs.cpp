@@ -88,7 +88,9 @@ std::size_t status_count(const SolveOutcome& outcome, io::SolutionStatus status)
 const std::string& measurement_file(const SolveRequest& request) { return request.positions.empty() ? request.rover : request.positions; }
 
 std::string formulation_text(const SolveRequest& request, const SolveInputs& in) {
-  return in.base ? request.formulation : !in.positions.empty() ? "none: positions of another program" : "single point (no base)";
+  if (!in.positions.empty()) return "none: positions of another program";
+  if (in.base) return request.formulation;
+  return in.inertial ? request.formulation + ", rover alone (no base)" : "single point (no base)";
 }
 
 std::string mode_text(const SolveRequest& request) {
@@ -125,12 +127,23 @@ std::size_t aligned_rows(const SolveOutcome& outcome) {
       std::count_if(outcome.rows.begin(), outcome.rows.end(), [](const io::TrajectoryRow& r) { return std::isfinite(r.heading_deg); }));
 }
 
+/// Sigmas of a correction's axes.
+Eigen::Vector4d sigmas_of(const vision::CameraCorrectionEstimate& found) { return found.covariance.diagonal().cwiseMax(0).cwiseSqrt(); }
+
+void append_camera_correction(const vision::CameraCorrectionEstimate& found, std::vector<ReportEntry>& lines) {
+  const Eigen::Vector4d sigma = sigmas_of(found);
+  lines.emplace_back("camera time offset", io::fixed_text(1e3 * found.value.time_offset_s, 2) + " +- " + io::fixed_text(1e3 * sigma[0], 2) + " ms");
+  lines.emplace_back("camera boresight (right, down, forward)",
+                     vector_text(found.value.boresight_rad() * kDeg, 3) + " +- " + vector_text(sigma.tail<3>() * kDeg, 3) + " deg");
+}
+
 void append_stereo_figures(const SolveOutcome& outcome, std::vector<ReportEntry>& lines) {
   const vision::AdmissionCounts& c = outcome.stereo->counts;
   lines.emplace_back("stereo frames", std::to_string(outcome.frames));
   lines.emplace_back("observations admitted", percent(c.of(vision::ObservationFate::admitted), static_cast<long>(c.offered())) + " of " +
                                                   std::to_string(c.offered()));
   lines.emplace_back("landmarks", std::to_string(c.landmarks) + ", " + std::to_string(outcome.stereo->dropped_landmarks) + " dropped as moving");
+  if (const auto& found = outcome.stereo->correction) append_camera_correction(*found, lines);
 }
 
 /// What became of frames and observations, in the order of the tests.
@@ -210,12 +223,15 @@ std::vector<ReportEntry> settings(const SolveRequest& request, const SolveInputs
     s.emplace_back("inertial unit", name(request.imu));
     s.emplace_back("readings", io::fixed_text(in.imu_interval_s > 0 ? 1 / in.imu_interval_s : 0, 1) + " Hz");
     if (!request.tracks.empty()) s.emplace_back("stereo tracks", name(request.tracks));
-    std::string without;
-    for (const std::string& part : request.without) (without += without.empty() ? "" : ", ") += part;
-    if (!without.empty()) s.emplace_back("screening without", without);
+    if (request.calibrate_camera) s.emplace_back("camera", "time offset and boresight estimated");
     s.emplace_back("lever arm (right, forward, up)", vector_text(in.inertial->lever_arm_b_m, 3) + " m");
     if (request.heading_deg)
       s.emplace_back("heading given", io::fixed_text(*request.heading_deg, 1) + " +- " + io::fixed_text(request.heading_sigma_deg, 1) + " deg");
+  }
+  for (const auto& [label, list] : {std::pair{"switched off", &request.without}, std::pair{"switched on", &request.with}}) {
+    std::string names;
+    for (const std::string& part : *list) (names += names.empty() ? "" : ", ") += part;
+    if (!names.empty()) s.emplace_back(label, names);
   }
   std::string wanted;
   for (const gnss::SignalCode& c : in.options.differencing.selection.wanted)
@@ -256,6 +272,8 @@ std::string subtitle_of(const SolveRequest& request, const SolveInputs& in, cons
   if (in.base)
     text += std::string{in.inertial ? ", with inertial unit" : ""} + ", base " + cell(baseline_km(in, outcome), 2) + " km away, " + request.formulation + " formulation, " + mode_text(request) +
             " ambiguity resolution";
+  else if (in.inertial && in.positions.empty())
+    text += ", with inertial unit, no base, " + request.formulation + " formulation";
   return text;
 }
 
@@ -316,6 +334,14 @@ void member_inertial(JsonWriter& json, const SolveOutcome& outcome) {
   json.end_array().end_object();
 }
 
+void member_camera_correction(JsonWriter& json, const vision::CameraCorrectionEstimate& found) {
+  const Eigen::Vector4d sigma = sigmas_of(found);
+  json.begin_object("camera_correction").member("time_offset_s", found.value.time_offset_s).member("time_offset_sigma_s", sigma[0]);
+  member_vector(json, "boresight_deg", found.value.boresight_rad() * kDeg);
+  member_vector(json, "boresight_sigma_deg", sigma.tail<3>() * kDeg);
+  json.end_object();
+}
+
 std::string summary_json(const SolveRequest& request, const SolveInputs& in, const SolveOutcome& outcome) {
   JsonWriter json;
   json.begin_object().member("schema", 1).member("program", std::string{"searvins "} + kVersionString).member("command", request.command);
@@ -351,6 +377,7 @@ std::string summary_json(const SolveRequest& request, const SolveInputs& in, con
     json.begin_object("stereo").member("frames", outcome.frames).member("landmarks", outcome.stereo->counts.landmarks);
     json.member("dropped_landmarks", outcome.stereo->dropped_landmarks);
     member_counts(json, "frame_fates", frame_fates(outcome)), member_counts(json, "observation_fates", observation_fates(outcome));
+    if (const auto& found = outcome.stereo->correction) member_camera_correction(json, *found);
     json.end_object();
   }
   json.begin_array("notes");

@@ -23,11 +23,14 @@
 #include <searvins/gnss/single_point_solution.hpp>
 #include <searvins/imu/imu_sample.hpp>
 #include <searvins/imu/position_fix.hpp>
+#include <searvins/vision/camera_correction.hpp>
 
 namespace searvins::examples {
 
 /// The robust formulation that `--robust` falls back to.
 inline constexpr const char* kDefaultFormulation = "symmetric";
+/// The one formulation that a camera can be calibrated under.
+inline constexpr const char* kCalibratingFormulation = "symmetric";
 
 /// An estimate that later epochs have improved.
 struct LaggedEstimate {
@@ -52,6 +55,7 @@ struct StereoReport {
   long dropped_landmarks{0};  ///< found to be no fixed points when they left the window
   long refused_frames{0};
   const char* refusal{""};  ///< of the last of them
+  std::optional<vision::CameraCorrectionEstimate> correction{};  ///< of a run that calibrates its camera
 };
 
 /// The frame that a run has screened last. `fates` are of the observations that it came with, in their order; none when the frame had none
@@ -127,17 +131,22 @@ class EpochRun : public SolverRun {
 struct RunOptions {
   estimator::RtkOptions rtk{};
   std::optional<estimator::StereoInertialOptions> inertial;
+  bool robust{true};          ///< false: every observation of code, phase and Doppler has weight one
+  bool batch_by_size{false};  ///< the batch form looks at |e|^2 / m instead of |e|^2
+  bool calibrate_camera{false};  ///< estimates time offset and boresight of the camera; with kCalibratingFormulation and an inertial unit
 };
 
 std::unique_ptr<SolverRun> make_batch_run(const RunOptions& options);
 std::unique_ptr<SolverRun> make_scalar_run(const RunOptions& options);
 std::unique_ptr<SolverRun> make_latent_run(const RunOptions& options);
 std::unique_ptr<SolverRun> make_symmetric_run(const RunOptions& options);
+std::unique_ptr<SolverRun> make_calibrating_run(const RunOptions& options);
 /// Without a base: robust single points and Doppler, filtered.
 std::unique_ptr<SolverRun> make_single_point_run(const estimator::RtkOptions& options);
 
 /// The estimator of a formulation by its word on the command line; empty for any other word.
 [[nodiscard]] inline std::unique_ptr<SolverRun> make_run(std::string_view formulation, const RunOptions& options) {
+  if (options.calibrate_camera) return formulation == kCalibratingFormulation ? make_calibrating_run(options) : nullptr;
   if (formulation == "batch") return make_batch_run(options);
   if (formulation == "scalar") return make_scalar_run(options);
   if (formulation == "latent") return make_latent_run(options);

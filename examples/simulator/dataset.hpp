@@ -2,7 +2,7 @@
 /// \file
 /// A simulated drive as the text of its files, and in figures.
 ///
-///     plain      rover.obs base.obs nav.rnx imu.csv truth.csv rig.json stereo_tracks.csv labels.csv
+///     plain      rover.obs base.obs nav.rnx imu.csv truth.csv streets.csv rig.json stereo_tracks.csv labels.csv
 ///     texcup     the names and forms of TEX-CUP: asterx4_rover.obs, asterx4_base_1hz.obs, brdmDDD0.YYp, lord_imu.log (raw axes left,
 ///                forward, down), ground_truth.log (UTC, 1 Hz)
 ///     ppc        those of the PPC-Dataset: rover.obs, base.obs, base.nav, imu.csv (forward, left, up; deg/s), reference.csv (5 Hz)
@@ -105,6 +105,20 @@ struct TruthRow {
     text += formatted(",%.7f,%.7f,%.7f,%.7f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f\n", q[0], q[1], q[2], q[3], r.imu_velocity_mps.x(),
                       r.imu_velocity_mps.y(), r.imu_velocity_mps.z(), r.antenna_velocity_mps.x(), r.antenna_velocity_mps.y(),
                       r.antenna_velocity_mps.z());
+  }
+  return text;
+}
+
+/// streets.csv: the way of the antenna as the middle of the street, a point every ten metres; a map to draw, or to play lanes with.
+[[nodiscard]] inline std::string streets_text(const Simulation& s) {
+  std::string text = "line,lat_deg,lon_deg,height_m\n";
+  Eigen::Vector3d last_e_m = Eigen::Vector3d::Zero();
+  for (int k = 0; k <= static_cast<int>(s.options().duration_s * 10); ++k) {
+    const Eigen::Vector3d p_e_m = detail::truth_row(s, 0.1 * k).antenna_e_m;
+    if ((p_e_m - last_e_m).norm() < 10) continue;
+    last_e_m = p_e_m;
+    const geodesy::Geodetic g = geodesy::geodetic_from_ecef(p_e_m);
+    text += formatted("1,%.8f,%.8f,%.2f\n", g.lat_rad * 180 / std::numbers::pi, g.lon_rad * 180 / std::numbers::pi, g.height_m);
   }
   return text;
 }
@@ -298,7 +312,7 @@ namespace detail {
   for (int k = 0; k <= last; ++k) {
     if (k % 100 == 0) progress(static_cast<double>(k) / (last + 1));
     const double t = k / rate;
-    for (const TrackObservation& o : camera.frame(s.vehicle().state(t)))
+    for (const TrackObservation& o : camera.frame(s.at_exposure(t)))
       text += formatted("%.3f,%d,%.2f,%.2f,%.2f,%.2f,%d\n", detail::sow(s, t), o.track, o.u_left_px, o.u_right_px, o.v_px, o.score,
                         o.semantic_class);
   }
@@ -386,6 +400,7 @@ struct FileNames {
   if (layout == Layout::texcup) set.files.push_back({"ground_truth.log", ground_truth_text(s)});
   if (layout == Layout::ppc) set.files.push_back({"reference.csv", reference_text(s)});
   if (layout == Layout::urbannav) set.files.push_back({"UrbanNav_SIM_GT_raw.txt", span_truth_text(s)});
+  if (layout == Layout::plain) set.files.push_back({"streets.csv", streets_text(s)});
   set.files.push_back({"rig.json", rig_text(s, layout)});
   set.files.push_back({"stereo_tracks.csv", tracks_text(s, part(0.82, 1))});
   set.files.push_back({"labels.csv", std::move(labels)});

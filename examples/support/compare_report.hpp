@@ -23,6 +23,7 @@
 #include "examples/support/paper_table.hpp"
 #include "examples/support/report.hpp"
 #include "examples/support/report_integrity.hpp"
+#include "examples/support/street_data.hpp"
 #include "examples/support/table.hpp"
 
 namespace searvins::examples {
@@ -35,6 +36,7 @@ struct Comparison {
   std::string title{"searvins comparison"};
   std::string command{};
   std::vector<ComparedRun> runs{};  ///< at least one, scored against one truth
+  std::vector<imu::CentrelinePoint> streets{};  ///< drawn below the tracks
   std::vector<PaperTableRow> table{};  ///< the paper's tables; empty: none
 };
 
@@ -206,7 +208,7 @@ matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
   }
   std::string t;
   for (const GpsTime time : times) t += (t.empty() ? "" : ",") + io::fixed_text(seconds_between(start, time), 3);
-  return "{\"sow\":" + json_literal(start.sow()) + ",\"t\":[" + t + "],\"s\":" + overall_s + ",\"e\":" + overall_e + ",\"n\":" + overall_n +
+  return "{\"sow\":" + json_literal(start.sow()) + ",\"t\":[" + t + "]" + street_member(comparison.streets, w) + ",\"s\":" + overall_s + ",\"e\":" + overall_e + ",\"n\":" + overall_n +
          ",\"integrity\":" + integrity_data(options) + ",\"runs\":[" + runs + "]}";
 }
 

@@ -21,6 +21,7 @@
 #include "examples/support/json_writer.hpp"
 #include "examples/support/report_integrity.hpp"
 #include "examples/support/run_report.hpp"
+#include "examples/support/street_data.hpp"
 
 namespace searvins::examples {
 
@@ -58,6 +59,7 @@ class ReportData {
     add_diagnostics();
     add_outages(start);
     add_truth(w);
+    text_ += street_member(report_.streets, w);
     add_scores();
     add_sky();
     return text_ + "}";

@@ -104,6 +104,20 @@ class MapView extends Layers {
     }
     return best;
   }
+  /* Streets as bands of eight metres, at least three pixels. */
+  streets(g) {
+    if (!D.streets) return;
+    g.strokeStyle = C.grid;
+    g.lineWidth = Math.max(3, 8 * this.scale);
+    g.lineCap = g.lineJoin = 'round';
+    for (const s of D.streets) {
+      g.beginPath();
+      s.e.forEach((e, i) => i ? g.lineTo(this.X(e), this.Y(s.n[i])) : g.moveTo(this.X(e), this.Y(s.n[i])));
+      g.stroke();
+    }
+    g.lineCap = 'butt';
+    g.lineJoin = 'miter';
+  }
   draw() {
     const g = this.prepare(this.back);
     if (this.w < 50) return;
@@ -127,6 +141,7 @@ class MapView extends Layers {
       g.lineTo(this.w, Math.round(y) + 0.5);
     }
     g.stroke();
+    this.streets(g);
     const inside = (x, y) => x > -50 && y > -50 && x < this.w + 50 && y < this.h + 50;
     if (D.truth) {
       if (D.truth.e.length === 1) {

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <searvins/imu/centreline.hpp>
 #include <searvins/core/time.hpp>
 #include <searvins/io/trajectory.hpp>
 
@@ -71,6 +72,7 @@ struct RunReport {
   std::optional<double> success_rate_gate{};  ///< drawn into the success-rate chart
   std::vector<ReportSatellite> satellites{};
   std::optional<TruthTrack> truth{};
+  std::vector<imu::CentrelinePoint> streets{};  ///< drawn below the track
   std::optional<Evaluation> evaluation{};  ///< scores for tiles, table and error distribution
   std::vector<Outage> outages{};           ///< shaded in the charts over time
   std::vector<StripPicture> strip{};       ///< frames of the camera, in the order of time

@@ -18,6 +18,7 @@
 #include <searvins/core/status.hpp>
 #include <searvins/core/time.hpp>
 
+#include <searvins/estimator/camera_calibration.hpp>
 #include <searvins/estimator/camera_predictor.hpp>
 #include <searvins/estimator/estimator.hpp>
 #include <searvins/estimator/free_motion.hpp>
@@ -56,10 +57,13 @@
 #include <searvins/gnss/single_point_problem.hpp>
 #include <searvins/gnss/single_point_solution.hpp>
 #include <searvins/gnss/single_point_tracker.hpp>
+#include <searvins/gnss/undifferenced_epoch.hpp>
 #include <searvins/gnss/weighting.hpp>
 
 #include <searvins/imu/alignment.hpp>
 #include <searvins/imu/attitude_angles.hpp>
+#include <searvins/imu/centreline.hpp>
+#include <searvins/imu/centreline_factor.hpp>
 #include <searvins/imu/earth.hpp>
 #include <searvins/imu/heading.hpp>
 #include <searvins/imu/imu_factor.hpp>
@@ -86,11 +90,16 @@
 
 #include <searvins/smoother/covariance.hpp>
 #include <searvins/smoother/elimination.hpp>
+#include <searvins/smoother/elimination_sizes.hpp>
 #include <searvins/smoother/factor.hpp>
+#include <searvins/smoother/factor_assembly.hpp>
 #include <searvins/smoother/fixed_lag_smoother.hpp>
+#include <searvins/smoother/front_matrix.hpp>
 #include <searvins/smoother/front_tree.hpp>
+#include <searvins/smoother/local_elimination.hpp>
 #include <searvins/smoother/marginal_prior.hpp>
 #include <searvins/smoother/optimise.hpp>
+#include <searvins/smoother/symmetric_products.hpp>
 #include <searvins/smoother/tables.hpp>
 #include <searvins/smoother/variable.hpp>
 #include <searvins/smoother/window.hpp>
@@ -103,6 +112,8 @@
 
 #include <searvins/vision/admission.hpp>
 #include <searvins/vision/admission_report.hpp>
+#include <searvins/vision/calibrating_stereo_factor.hpp>
+#include <searvins/vision/camera_correction.hpp>
 #include <searvins/vision/camera_model.hpp>
 #include <searvins/vision/camera_motion.hpp>
 #include <searvins/vision/frontend.hpp>

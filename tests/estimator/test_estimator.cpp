@@ -390,6 +390,42 @@ TEST_CASE("P18 the rover is silent for good, or from the start: dr to the end, a
   CHECK(after.max_m < 0.1);
 }
 
+TEST_CASE("the base is lost in streets for ten minutes: codes of the rover alone bound what Doppler shifts and readings let drift") {
+  const InertialDrive d = simulated_inertial_drive("urban", 700, 42);
+  std::vector<Arrival> all = arrivals(d);
+  cut(all, d, Stream::base, 70);
+  std::array<DriveScore, 2> end;
+  std::array<double, 2> sigma_m{};
+  for (const std::size_t codes : {0U, 1U}) {
+    EstimatorOptions options = options_for(d);
+    options.rtk.use_undifferenced = codes == 1;
+    const Run run = run_all(d, all, options);
+    const DriveScore lost = score_of(d, run, 102, 700);
+    end[codes] = score_of(d, run, 400, 700), sigma_m[codes] = horizontal_sigma_m(run.solutions.back());
+    MESSAGE(line_of(codes == 1 ? "base lost, codes of the rover" : "base lost, no codes", lost) << ", sigma at the end " << sigma_m[codes] << " m, second half rms " << end[codes].rms_m());
+    CHECK(lost.solutions >= 598);
+    CHECK(lost.of(SolutionStatus::fix) + lost.of(SolutionStatus::float_) + lost.of(SolutionStatus::dgnss) == 0);
+  }
+  CHECK(end[1].of(SolutionStatus::spp) > 250);
+  CHECK(sigma_m[1] < sigma_m[0]);
+  CHECK(end[1].mean_nees() < 6);
+  CHECK(end[1].max_m < 3);
+}
+
+TEST_CASE("tightly coupled without any base: aligned by single points, metres, honest covariance, nothing called better than it is") {
+  const InertialDrive d = simulated_inertial_drive("light", 200, 44);
+  std::vector<Arrival> all = arrivals(d);
+  cut(all, d, Stream::base, -10);
+  const Run run = run_all(d, all, options_for(d));
+  check_nothing_silent(d, run, 0, 199);
+  const DriveScore whole = score_of(d, run, 0, 200), driven = score_of(d, run, 60, 200);
+  MESSAGE(line_of("rover only", whole));
+  CHECK(whole.of(SolutionStatus::spp) + whole.of(SolutionStatus::dr) == whole.solutions);
+  CHECK(driven.aligned == driven.solutions);
+  CHECK(driven.rms_m() < 3);
+  CHECK(driven.mean_nees() < 6);
+}
+
 TEST_CASE("P18 two satellites or one after the alignment: the window goes on and stays within a metre") {
   for (const std::size_t left : {std::size_t{1}, std::size_t{2}, std::size_t{3}}) {
     CAPTURE(left);

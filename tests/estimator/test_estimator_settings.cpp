@@ -101,6 +101,10 @@ const Flip kWheels[] = {
     {"inertial.non_holonomic_sigma_mps", [](EstimatorOptions& o) { o.inertial.non_holonomic_sigma_mps = 0.01; }},
     {"inertial.non_holonomic_from_mps", [](EstimatorOptions& o) { o.inertial.non_holonomic_from_mps = 9; }},
 };
+const Flip kWithoutBase[] = {
+    {"rtk.use_undifferenced", [](EstimatorOptions& o) { o.rtk.use_undifferenced = false; }},
+    {"rtk.undifferenced_correlation_s", [](EstimatorOptions& o) { o.rtk.undifferenced_correlation_s = 5; }},
+};
 const Flip kRestSpeeds[] = {
     {"inertial.max_rest_speed_sigmas", [](EstimatorOptions& o) { o.inertial.max_rest_speed_sigmas = 0; }},
     {"inertial.max_rest_speed_mps", [](EstimatorOptions& o) { o.inertial.max_rest_speed_mps = 0.3; }},
@@ -139,6 +143,9 @@ TEST_CASE("P12 every settings field of the inertial estimator changes some outpu
   EstimatorOptions wheels = options, rests = options, jumps = options, impatient = options;
   wheels.inertial.non_holonomic = true;
   check_flips(e, wheels, kWheels);
+  Eventful rover_only;
+  cut(rover_only.all, rover_only.drive, Stream::base, -10);
+  check_flips(rover_only, options, kWithoutBase);
   rests.inertial.max_rest_speed_mps = 0;
   check_flips(e, rests, kRestSpeeds);
   impatient.rtk.min_suspect_epochs = 1;  // windows are given up often

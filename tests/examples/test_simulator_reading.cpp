@@ -120,6 +120,7 @@ TEST_CASE("simulate: writes the files of each layout, says what is in them, and 
   CHECK(test::has(plain, "profile light, seed 1, 20 s"));
   for (const char* name : {"rover.obs", "base.obs", "nav.rnx", "imu.csv", "truth.csv", "rig.json", "stereo_tracks.csv", "labels.csv"})
     CHECK_MESSAGE(std::filesystem::file_size(folder / "plain" / name) > 500, name);
+  CHECK(std::filesystem::exists(folder / "plain/streets.csv"));
   const std::string route = (folder / "plain/truth.csv").string(), nav = (folder / "plain/nav.rnx").string();
   const auto again = test::run("simulate --layout texcup --route " + route + " --nav " + nav + " --out " + (folder / "again").string());
   CHECK(again.exit_code == 0);

@@ -256,12 +256,38 @@ TEST_CASE_FIXTURE(Fixture, "solve --imu: usage errors exit with 2 and say what i
   refused("--rate camera", "--rate camera needs --tracks FILE");
   refused("--rate often", "'often' is none of gnss, camera, imu");
   refused("--tracks x", "--tracks x needs --imu FILE");
-  refused("--without motion --rig " + rig + " --imu " + imu, "--without needs --tracks FILE");
+  refused("--without motion --rig " + rig + " --imu " + imu, "--without motion needs --tracks FILE");
   refused("--tracks x --without ears --rig " + rig + " --imu " + imu, "'ears' is none of semantic, geometric, motion, maturity");
+  refused("--with ears", "--with: 'ears' is none of wheels, cn0, code-gate, batch-size");
+  refused("--with wheels", "--with wheels needs --imu FILE");
+  refused("--with batch-size", "--with batch-size needs --robust batch");
   refused("--positions x --rig " + rig + " --imu " + imu, "--positions is given: leave --rover out");
   CHECK(has(run("solve --positions x --out " + path("out")), "--positions needs --imu FILE"));
   refused("--heading 90", "--heading 90 needs --imu FILE");
   refused("--heading 90,0 --rig " + rig + " --imu " + imu, "the sigma must lie in 0 .. 90");
+}
+
+TEST_CASE_FIXTURE(Fixture, "solve --imu without --base: codes of the rover alone, every epoch answered, nothing called better than a single point") {
+  const Outcome outcome = run("solve --rover " + rover + " --nav " + data + "nav.rnx --imu " + imu + " --rig " + rig + " --truth " + data + "truth.csv --out " + path("out"));
+  REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
+  CHECK(has(outcome, "rover alone (no base)"));
+  const std::vector<io::TrajectoryRow> all = rows();
+  CHECK(std::all_of(all.begin(), all.end(), [](const io::TrajectoryRow& r) { return r.status == io::SolutionStatus::spp || r.status == io::SolutionStatus::dr; }));
+  CHECK(std::isfinite(all.back().heading_deg));
+  const examples::Json json = summary();
+  CHECK(json.find("errors_m")->find("availability_pct")->number > 99);
+  CHECK(json.find("errors_m")->find("horizontal")->find("rmse")->number < 3);
+}
+
+TEST_CASE_FIXTURE(Fixture, "solve: every policy that can be switched changes the trajectory") {
+  REQUIRE(solve().exit_code == 0);
+  const std::string before = *io::read_text_file(path("out/trajectory.csv"));
+  for (const char* policy : {"--with wheels", "--with cn0", "--without robust", "--robust batch --with batch-size"}) {
+    CAPTURE(policy);
+    const Outcome outcome = solve(policy);
+    REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
+    CHECK(*io::read_text_file(path("out/trajectory.csv")) != before);
+  }
 }
 
 TEST_CASE_FIXTURE(Fixture, "solve --positions: loosely coupled to the positions of an earlier run") {
@@ -309,7 +335,9 @@ TEST_CASE_FIXTURE(Fixture, "evaluate --report: several runs on one page") {
   REQUIRE(solve().exit_code == 0);
   std::filesystem::rename(folder / "out", folder / "with_imu");
   REQUIRE(run("solve --rover " + rover + " --base " + data + "base.obs --nav " + data + "nav.rnx --rig " + rig + " --out " + path("gnss_only")).exit_code == 0);
-  const Outcome outcome = run("evaluate --truth " + data + "truth.csv " + path("with_imu") + ' ' + path("gnss_only") + " --report " + path("both.html"));
+  REQUIRE(io::write_text_file(path("streets.csv"), "line,lat_deg,lon_deg,height_m\n1,48.1,11.5,560\n1,48.101,11.5,560\n2,48.1,11.5,560\n2,48.1,11.502,560\n").empty());
+  const Outcome outcome = run("evaluate --truth " + data + "truth.csv " + path("with_imu") + ' ' + path("gnss_only") + " --report " + path("both.html") +
+                              " --streets " + path("streets.csv"));
   REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
   const std::string html = *io::read_text_file(path("both.html"));
   CHECK(html.find("with_imu and gnss_only") != std::string::npos);
@@ -318,6 +346,8 @@ TEST_CASE_FIXTURE(Fixture, "evaluate --report: several runs on one page") {
   const auto json = examples::parse_json(std::string_view{html}.substr(at, html.find("</script>", at) - at), "run-data");
   REQUIRE_MESSAGE(json.ok(), io::to_string(json.error()));
   REQUIRE(json->find("runs")->elements.size() == 2);
+  CHECK(json->find("streets")->elements.size() == 2);
+  CHECK(json->find("streets")->elements[0].find("e")->elements.size() == 2);
   for (const examples::Json& one : json->find("runs")->elements)
     for (const char* column : {"s", "e", "n", "h", "v", "d", "q"}) CHECK(one.find(column)->elements.size() == json->find("t")->elements.size());
   for (const char* outside : {"http://", "https://", "src=", "@import", "url("}) CHECK_MESSAGE(html.find(outside) == std::string::npos, outside);

@@ -104,8 +104,12 @@ class Estimator {
   using Bound = RtkEstimator<RtkConfig<Form, CapacityType, Motion>>;
   using Options = BasicEstimatorOptions<typename Motion::Options>;
 
-  explicit Estimator(const Options& options = {})
-      : options_(options), free_(options.rtk), bound_(inertial_rtk(options.rtk), {}, {}, options.inertial), initializer_(initializer_settings(options)),
+  using CodePhaseForm = typename Bound::CodePhaseForm;
+  using DopplerForm = typename Bound::DopplerForm;
+
+  /// Settings of the robust policies are those of the forms themselves (their `loss`).
+  explicit Estimator(const Options& options = {}, const CodePhaseForm& code_phase = {}, const DopplerForm& doppler = {})
+      : options_(options), free_(options.rtk, code_phase, doppler), bound_(inertial_rtk(options.rtk), code_phase, doppler, options.inertial), initializer_(initializer_settings(options)),
         detector_(options.inertial.preintegration.noise, options.inertial.detector) {}
 
   /// Broadcast records. Errors: capacity_exceeded.

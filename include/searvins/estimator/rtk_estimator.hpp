@@ -17,6 +17,9 @@
 ///
 ///     C = q C_fixed + (1 - q) C_float
 ///
+/// Without a base (none given, none of late, too few satellites in common) and with an inertial unit, codes of the rover alone take the place of the
+/// differences, labelled spp, and the window goes on (gnss/undifferenced_epoch.hpp).
+///
 /// A wrong fix cannot confirm itself: float and covariance that integers are judged by, and the prior that leaves the window, never contain an earlier
 /// integer. Integers held in the window only shape the solution that is output between fixes.
 ///
@@ -40,6 +43,7 @@
 #include <searvins/gnss/double_difference.hpp>
 #include <searvins/gnss/ephemeris.hpp>
 #include <searvins/gnss/single_point_tracker.hpp>
+#include <searvins/gnss/undifferenced_epoch.hpp>
 
 namespace searvins::estimator {
 
@@ -88,8 +92,9 @@ class RtkEstimator {
     started_ = true, last_tag_ = rover.tag;
     const Status differenced = difference(rover, tracked, out);
     const bool is_differenced = differenced.ok() && epoch_.satellites >= options_.min_satellites;
+    is_undifferenced_ = false;
     if (!is_differenced) continuation_.skip_epoch();
-    if (!differenced.ok() && goes_on_without_gnss()) drop_differences();
+    if (!is_differenced && goes_on_without_gnss()) without_base(rover);
     if ((is_differenced || goes_on_without_gnss()) && extend(out))
       estimate(out);
     else
@@ -214,7 +219,7 @@ class RtkEstimator {
     out.source = source;
     single_point_ = {};
     predict(failure(StatusCode::no_data, "no rover epoch"), out);
-    drop_differences(), epoch_.doppler.clear(), epoch_.doppler_pivot = -1;
+    drop_differences(), epoch_.doppler.clear(), epoch_.doppler_pivot = -1, is_undifferenced_ = false;
     const bool is_frame = source == SolutionSource::camera;
     if (!is_frame) continuation_.skip_epoch();
     if (extend(out, !is_frame)) {
@@ -294,6 +299,14 @@ class RtkEstimator {
     epoch_.satellites = 0;
   }
 
+  /// Codes of the rover alone where there is something to carry them; else only its Doppler shifts are left.
+  void without_base(const gnss::ObservationEpoch& rover) {
+    drop_differences();
+    if (!options_.use_undifferenced) return;
+    gnss::undifference(rover, ephemerides_, predicted_e_m_, options_.tracker.single_point, undifferenced_codes_, epoch_);
+    is_undifferenced_ = !epoch_.groups.empty();
+  }
+
   /// Without double differences: the better of prediction and single point, said so.
   void without_differences(const Result<gnss::TrackedPosition>& tracked, RtkSolution& out) {
     out.satellites = tracked.ok() ? single_point_.used : 0;
@@ -345,7 +358,7 @@ class RtkEstimator {
     (void)nodes_.push_back({*state, out.time, antenna_, SolutionStatus::dr});
     stationary_ = out.stationary;
     code_keys_.clear(), phase_keys_.clear(), differences_.clear();
-    code_variance_factor_ = code_noise_.variance_factor(), phase_variance_factor_ = phase_noise_.variance_factor();
+    code_variance_factor_ = is_undifferenced_ ? 1 : code_noise_.variance_factor(), phase_variance_factor_ = phase_noise_.variance_factor();
     code_information_share_ = 1 / correlation_factor(out);
     for (int g = 0; g < static_cast<int>(epoch_.groups.size()); ++g) add_group(g, *state, start_e_m, out);
     if (options_.use_doppler) add_doppler(*state, out);
@@ -368,7 +381,8 @@ class RtkEstimator {
     if (is_instantaneous()) return 1;
     const double interval_s = has_epoch_ ? seconds_between(last_epoch_time_, out.time) : 1.0;
     const double speed_mps = std::max(1e-3, predicted_v_e_mps_.norm());
-    const double correlation_s = std::min(options_.code_correlation_s, options_.code_correlation_m / speed_mps);
+    double correlation_s = std::min(options_.code_correlation_s, options_.code_correlation_m / speed_mps);
+    if (is_undifferenced_) correlation_s = options_.undifferenced_correlation_s;
     return std::max(1.0, correlation_s / std::max(0.05, interval_s));
   }
 
@@ -668,7 +682,7 @@ class RtkEstimator {
   void estimate(RtkSolution& out) {
     smoother_.template set_enabled<gnss::IntegerFix>(false);
     if (!optimise(out)) return recover(out);
-    out.status = out.phases > 0 ? SolutionStatus::float_ : out.double_differences > 0 ? SolutionStatus::dgnss : SolutionStatus::dr;
+    out.status = status_of_rows(out);
     const bool have_float = collect_float(out);
     if (!have_float) float_.Q_pp = held_.empty() ? Eigen::Matrix3d::Zero() : position_covariance();
     while (is_window_long(out)) marginalise_oldest();
@@ -691,10 +705,17 @@ class RtkEstimator {
     if (options_.fix_memory == FixMemory::epoch) release_all();
     out.held_integers = static_cast<int>(held_.size());
     out.code_scale = std::sqrt(code_noise_.variance_factor()), out.phase_scale = std::sqrt(phase_noise_.variance_factor());
-    learn_code_noise();
+    if (!is_undifferenced_) learn_code_noise();
     watch_divergence(out);
   }
   static constexpr std::size_t kPhasesSize = static_cast<std::size_t>(kPhases);
+
+  /// What an epoch is before its integers are looked at.
+  [[nodiscard]] SolutionStatus status_of_rows(const RtkSolution& out) const {
+    if (out.phases > 0) return SolutionStatus::float_;
+    if (out.double_differences == 0) return SolutionStatus::dr;
+    return is_undifferenced_ ? SolutionStatus::spp : SolutionStatus::dgnss;
+  }
 
   /// A state without GNSS: what leaves the window leaves it without integers, as ever, and those that are held go on shaping the rest.
   void estimate_frame(RtkSolution& out) {
@@ -722,7 +743,8 @@ class RtkEstimator {
 
   /// The window could not be solved: it is dropped, the epoch answers from its own start.
   void recover(RtkSolution& out) {
-    out.status = out.double_differences > 0 ? SolutionStatus::dgnss : SolutionStatus::dr;
+    out.phases = 0;
+    out.status = status_of_rows(out);
     set_antenna(nodes_.empty() ? predicted_ : *smoother_.find(nodes_.back().state), antenna_, out);
     const double sigma_m = std::max(5.0, predicted_sigma_m_);
     out.covariance_enu_m2 = Eigen::Matrix3d::Identity() * sigma_m * sigma_m;
@@ -914,7 +936,7 @@ class RtkEstimator {
     const auto covariance = smoother_.covariance(nodes_.back().state);
     const StateCovariance P = covariance.ok() ? *covariance : start_covariance();
     describe(x, P, antenna_, out);
-    if constexpr (Motion::has_camera) out.tracks = motion_.frame_report().admitted;
+    if constexpr (Motion::has_camera) out.tracks = motion_.frame_report().admitted, motion_.remember(smoother_);
     if (!held_.empty()) doubt_integers(out);
     settle(x, P, nodes_.back().time, held_.empty());
     nodes_.back().status = out.status;
@@ -968,6 +990,7 @@ class RtkEstimator {
   gnss::Differencer differencer_{};
   gnss::DifferencedEpoch epoch_{};
   gnss::SinglePointSolution single_point_{};
+  gnss::SinglePointSolution undifferenced_codes_{};  ///< room to work in
   Smoother smoother_{};
   ambiguity::Continuation<AmbiguityKey, 2 * kPhasesSize> continuation_{};
   ambiguity::Resolver<kPhases> resolver_{};
@@ -993,6 +1016,7 @@ class RtkEstimator {
   typename Motion::Antenna antenna_{};  ///< at the epoch at hand
   GpsTime last_time_{};
   bool is_predicted_{false}, has_state_{false};
+  bool is_undifferenced_{false};  ///< the codes of the epoch at hand are the rover's alone
   double integer_trust_{1};  ///< probability that the integers accepted last are right
   Eigen::Matrix3d doubt_enu_m2_{Eigen::Matrix3d::Zero()};  ///< what that adds to the covariance of the position
   GpsTime last_epoch_time_{};  ///< of the last state with codes in this window

@@ -59,6 +59,10 @@ struct RtkOptions {
   /// Codes (with their phases) further than this many sigmas of prediction and code from the predicted double difference are left out; 0: no gate.
   /// Off by default: what it earns on one drive it costs on another (docs/benchmarks.md).
   double code_gate_sigmas{0};
+  /// Where an inertial unit carries the window, codes of the rover alone serve while there is no base (gnss/undifferenced_epoch.hpp). What broadcast models
+  /// leave lasts, so that codes within this time are worth one.
+  bool use_undifferenced{true};
+  double undifferenced_correlation_s{100};
   bool use_phase{true};
   bool use_doppler{true};
   double lag_s{6};                      ///< window length; at least arc_epochs + 1 epochs are kept whatever their interval
