@@ -2,9 +2,11 @@
 // P21: code for two sets of machine flags in one program, over a boundary of plain C structs. Both sides see the same layout of every
 // public type, and
 // compute the same to rounding. Says that it skips on a processor without AVX2.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <iterator>
 
 #include "embedded/two_flag_sets/boundary.h"
 
