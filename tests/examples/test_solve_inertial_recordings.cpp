@@ -281,12 +281,19 @@ TEST_CASE_FIXTURE(Fixture, "solve --imu without --base: codes of the rover alone
 
 TEST_CASE_FIXTURE(Fixture, "solve: every policy that can be switched changes the trajectory") {
   REQUIRE(solve().exit_code == 0);
-  const std::string before = *io::read_text_file(path("out/trajectory.csv"));
+  const auto way = [this] {  // the file also has times of solving, which differ from run to run
+    std::vector<double> numbers;
+    for (const io::TrajectoryRow& row : rows()) numbers.insert(numbers.end(), row.p_e_m.begin(), row.p_e_m.end());
+    return numbers;
+  };
+  const std::vector<double> before = way();
+  REQUIRE(solve().exit_code == 0);
+  CHECK(way() == before);
   for (const char* policy : {"--with wheels", "--with cn0", "--without robust", "--robust batch --with batch-size"}) {
     CAPTURE(policy);
     const Outcome outcome = solve(policy);
     REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
-    CHECK(*io::read_text_file(path("out/trajectory.csv")) != before);
+    CHECK(way() != before);
   }
 }
 
