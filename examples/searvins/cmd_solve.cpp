@@ -92,17 +92,17 @@ void check_rate(Options& options) {
 
 /// What is switched off and on.
 void take_policies(Options& options, SolveRequest& request, bool is_dataset) {
-  const auto is_one_of = [](const auto& names, const std::string& name) { return std::find(names.begin(), names.end(), name) != names.end(); };
+  const auto is_one_of = [](const auto& known, const std::string& name) { return std::find(known.begin(), known.end(), name) != known.end(); };
   request.without = options.list("without"), request.with = options.list("with");
   for (const std::string& part : request.without) {
     if (part == kRobustPart) continue;
-    if (!is_one_of(kScreeningParts, part)) options.fail("--without: '" + part + "' is none of semantic, geometric, motion, maturity, stereo, robust");
+    if (!is_one_of(kScreeningParts, part)) options.fail("--without: '" + part + "' is none of " + joined(kScreeningParts) + ", " + kRobustPart);
     if (!request.has_camera() && !is_dataset) options.fail("--without " + part + " needs --tracks FILE or --images DIR");
   }
   for (const std::string& policy : request.with)
-    if (!is_one_of(kPolicies, policy)) options.fail("--with: '" + policy + "' is none of wheels, cn0, code-gate, batch-size");
-  if (is_one_of(request.with, "wheels") && request.imu.empty() && !is_dataset) options.fail("--with wheels needs --imu FILE");
-  if (is_one_of(request.with, "batch-size") && options.text("robust") != "batch") options.fail("--with batch-size needs --robust batch");
+    if (!is_one_of(kPolicies, policy)) options.fail("--with: '" + policy + "' is none of " + joined(kPolicies));
+  if (request.is_with("wheels") && request.imu.empty() && !is_dataset) options.fail("--with wheels needs --imu FILE");
+  if (request.is_with("batch-size") && options.text("robust") != "batch") options.fail("--with batch-size needs --robust batch");
 }
 
 /// Options of the inertial unit, and what each of them needs.

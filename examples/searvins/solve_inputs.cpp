@@ -252,7 +252,7 @@ Failure take_unit(const SolveRequest& request, const Rig& rig, SolveInputs& in) 
   const bool is_mean = rig.imu->sample == RigImu::Sample::mean_to_stamp;
   inertial.preintegration.kind = is_mean ? imu::SampleKind::mean_to_stamp : imu::SampleKind::instantaneous;
   inertial.lever_arm_b_m = rig.R_rfu_b * *rig.lever_arm_b_m;
-  inertial.non_holonomic = std::find(request.with.begin(), request.with.end(), "wheels") != request.with.end();
+  inertial.non_holonomic = request.is_with("wheels");
   return {};
 }
 
@@ -260,10 +260,8 @@ constexpr double kCodeGateSigmas = 5;
 
 /// Policies of --with that GNSS alone has.
 void take_policies(const SolveRequest& request, SolveInputs& in) {
-  for (const std::string& policy : request.with) {
-    if (policy == "cn0") in.options.differencing.cn0_weighting = true;
-    if (policy == "code-gate") in.options.code_gate_sigmas = kCodeGateSigmas;
-  }
+  if (request.is_with("cn0")) in.options.differencing.cn0_weighting = true;
+  if (request.is_with("code-gate")) in.options.code_gate_sigmas = kCodeGateSigmas;
 }
 
 /// The rectified pair that the rig describes.

@@ -527,9 +527,8 @@ io::FileResult<bool> feed(const SolveRequest& request, const SolveInputs& in, Me
 namespace {
 
 RunOptions run_options(const SolveRequest& request, const SolveInputs& in) {
-  const auto names = [](const std::vector<std::string>& list, const char* name) { return std::find(list.begin(), list.end(), name) != list.end(); };
   RunOptions o{.rtk = in.options, .inertial = in.inertial, .calibrate_camera = request.calibrate_camera};
-  o.robust = !names(request.without, kRobustPart), o.batch_by_size = names(request.with, "batch-size");
+  o.robust = !request.is_without(kRobustPart), o.batch_by_size = request.is_with("batch-size");
   return o;
 }
 

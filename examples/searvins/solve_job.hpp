@@ -5,10 +5,12 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -66,6 +68,8 @@ struct SolveRequest {
   std::string label{"solve"};       ///< of the progress line
 
   [[nodiscard]] bool has_camera() const { return !tracks.empty() || !images.empty(); }
+  [[nodiscard]] bool is_with(std::string_view policy) const { return std::find(with.begin(), with.end(), policy) != with.end(); }
+  [[nodiscard]] bool is_without(std::string_view part) const { return std::find(without.begin(), without.end(), part) != without.end(); }
 };
 
 /// The files, read and checked against each other.

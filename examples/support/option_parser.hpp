@@ -62,6 +62,14 @@ inline constexpr int kExitDegraded = 4;
   return best;
 }
 
+/// The words of a list for a message: "a, b, c".
+template <class Words>
+[[nodiscard]] std::string joined(const Words& words) {
+  std::string text;
+  for (const auto& word : words) (text += text.empty() ? "" : ", ") += word;
+  return text;
+}
+
 /// One declared option.
 struct OptionSpec {
   std::string name{};        ///< without the dashes
@@ -284,11 +292,6 @@ class OptionParser {
     if (options.positionals_.size() > positional_max_) options.fail("unexpected argument '" + options.positionals_[positional_max_] + "'");
   }
 
-  [[nodiscard]] static std::string joined(const std::vector<std::string>& words) {
-    std::string text;
-    for (const std::string& word : words) (text += text.empty() ? "" : ", ") += word;
-    return text;
-  }
   [[nodiscard]] static std::string left_text(const OptionSpec& spec) {
     return "--" + spec.name + (spec.value_name.empty() ? "" : ' ' + spec.value_name);
   }

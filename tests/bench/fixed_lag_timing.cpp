@@ -52,7 +52,7 @@ void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 
 int main(int argc, char** argv) {
   using searvins::test::FixedLagRun;
-  if (argc < 2) return std::fprintf(stderr, "usage: fixed_lag_timing DATA [steps=1] [frames=1200] [relinearise=0] [weight=0]\n"), 2;
+  if (argc < 2) return std::fprintf(stderr, "usage: fixed_lag_timing DATA [steps=1] [frames=1200] [relinearise=0] [weight=0] [halvings=2] [print=0]\n"), 2;
   const auto workload = searvins::test::read_fixed_lag_workload(argv[1]);
   if (!workload) return std::fprintf(stderr, "no workload in %s\n", argv[1]), 1;
   auto options = FixedLagRun::options_of(static_cast<int>(option(argc, argv, "steps", 1)));

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// \file
-/// The estimator with an inertial unit and a stereo camera behind a compiled wall: instantiated once for the tests (stereo_under_test.cpp), with the
-/// symmetric latent form and the capacities below.
+/// The estimator with an inertial unit and a stereo camera behind a compiled wall: instantiated once for the tests (stereo_under_test.cpp,
+/// calibrating_under_test.cpp), with the symmetric latent form and the capacities below.
 #pragma once
 
 #include <cstddef>
 #include <memory>
 
+#include <searvins/estimator/camera_calibration.hpp>
 #include <searvins/estimator/estimator.hpp>
 #include <searvins/estimator/stereo_inertial_motion.hpp>
 
@@ -25,16 +26,16 @@ struct StereoTestCapacity : TestCapacity {
   static constexpr std::size_t arena_scalars = 9'000'000;
 };
 
-using StereoTestMotion = estimator::StereoInertialMotion<imu::RotatingEarth, 128, 768>;
-
-/// estimator::Estimator<robust::LatentPivotSymmetric, StereoTestCapacity, StereoTestMotion>; its functions by their names.
-class StereoUnderTest {
+/// estimator::Estimator<robust::LatentPivotSymmetric, StereoTestCapacity, Motion>; its functions and those of its motion by their names.
+template <class Camera>
+class CameraEstimatorUnderTest {
  public:
+  using Motion = estimator::StereoInertialMotion<imu::RotatingEarth, 128, 768, Camera>;
   using Options = estimator::BasicEstimatorOptions<estimator::StereoInertialOptions>;
-  using Frame = StereoTestMotion::Frame;
+  using Frame = typename Motion::Frame;
 
-  explicit StereoUnderTest(const Options& options);
-  ~StereoUnderTest();
+  explicit CameraEstimatorUnderTest(const Options& options);
+  ~CameraEstimatorUnderTest();
 
   Status add_ephemeris(const gnss::Ephemeris& e);
   void set_ionosphere(const gnss::KlobucharCoefficients& k);
@@ -47,12 +48,16 @@ class StereoUnderTest {
   Result<estimator::RtkSolution> next();
   [[nodiscard]] int alignments() const;
   [[nodiscard]] long refused_frames() const;
-  [[nodiscard]] const vision::AdmissionCounts& counts() const;
-  [[nodiscard]] long dropped_landmarks() const;
+  [[nodiscard]] const Motion& motion() const;
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+using StereoUnderTest = CameraEstimatorUnderTest<estimator::KnownCamera>;
+using CalibratingUnderTest = CameraEstimatorUnderTest<estimator::CalibratedCamera>;
+extern template class CameraEstimatorUnderTest<estimator::KnownCamera>;
+extern template class CameraEstimatorUnderTest<estimator::CalibratedCamera>;
 
 }  // namespace searvins::test

@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <numbers>
 
-#include "estimator/calibrating_under_test.hpp"
 #include "estimator/inertial_drive.hpp"
 #include "estimator/stereo_under_test.hpp"
 
@@ -91,7 +90,7 @@ TEST_CASE("a camera 5 ms and 0.3 degrees off: believed, it spoils the solution; 
   print("as told", drive_as_told(), good), print("off, believed", drive_off(), bad), print("off, calibrated", drive_off(), found);
   for (const Run* run : {&good, &bad, &found}) CHECK((run->errors == 0 && run->refused == 0 && run->alignments == 1));
 
-  const vision::CameraCorrectionEstimate& c = calibrating.correction();
+  const vision::CameraCorrectionEstimate& c = calibrating.motion().camera().estimate();
   const Eigen::Vector4d sigma = c.covariance.diagonal().cwiseSqrt();
   const Eigen::Vector3d off_rad = so3::log(Eigen::Matrix3d{c.value.R_nc.transpose() * so3::exp(boresight_rad())});
   char line[240];

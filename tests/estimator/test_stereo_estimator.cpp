@@ -70,7 +70,7 @@ StereoRun run_with(const InertialDrive& d, const StereoUnderTest::Options& optio
     take();
   }
   e.finish(), take();
-  run.alignments = e.alignments(), run.counts = e.counts(), run.refused_frames = e.refused_frames(), run.dropped_landmarks = e.dropped_landmarks();
+  run.alignments = e.alignments(), run.counts = e.motion().counts(), run.refused_frames = e.refused_frames(), run.dropped_landmarks = e.motion().dropped_landmarks();
   return run;
 }
 

@@ -64,27 +64,17 @@ CalibratingStereoFactor<> factor_of(const Scene& s, const Eigen::Vector3d& pixel
 using Matrix3x22 = Eigen::Matrix<double, 3, 22>;
 
 double jacobian_error(const CalibratingStereoFactor<>& f, Scene& s, double step) {
-  double e[3]{}, plus[3]{}, minus[3]{};
-  Matrix3x22 J = Matrix3x22::Zero(), numeric = Matrix3x22::Zero();
+  double e[3]{};
+  Matrix3x22 J = Matrix3x22::Zero(), numeric;
   f.linearise(s.values, e, {J.data(), 3});
-  const auto column = [&](int c, auto& value, const auto& d) {
-    const auto before = value;
-    value = before.retract(d), f.evaluate(s.values, plus);
-    value = before.retract(-d), f.evaluate(s.values, minus);
-    value = before;
-    numeric.col(c) = (Eigen::Map<Eigen::Vector3d>(plus) - Eigen::Map<Eigen::Vector3d>(minus)) / (2 * step);
-  };
-  for (int i = 0; i < 15; ++i) column(i, s.values.at(s.state), NavigationState::Step{step * NavigationState::Step::Unit(i)});
-  for (int i = 0; i < 3; ++i) column(15 + i, s.values.at(s.landmark), Landmark::Step{step * Landmark::Step::Unit(i)});
-  for (int i = 0; i < 4; ++i) column(18 + i, s.values.at(s.correction), CameraCorrection::Step{step * CameraCorrection::Step::Unit(i)});
-  const auto part = [&](int first, int n) {
-    return (J.middleCols(first, n) - numeric.middleCols(first, n)).cwiseAbs().maxCoeff() / J.middleCols(first, n).cwiseAbs().maxCoeff();
-  };
+  numeric << numeric_columns<3>(f, s.values, s.state, step), numeric_columns<3>(f, s.values, s.landmark, step),
+      numeric_columns<3>(f, s.values, s.correction, step);
   CHECK(J.middleCols<9>(6).isZero(0));  // velocity and biases are not seen
   CHECK(numeric.middleCols<9>(6).isZero(0));
   double plain[3]{};
   f.evaluate(s.values, plain);
   CHECK((Eigen::Map<Eigen::Vector3d>(plain) == Eigen::Map<Eigen::Vector3d>(e)));
+  const auto part = [&](int first, int count) { return part_error(J, numeric, first, count); };
   return std::max({part(0, 3), part(3, 3), part(15, 3), part(18, 1), part(19, 3)});
 }
 

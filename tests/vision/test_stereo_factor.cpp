@@ -56,24 +56,13 @@ using Matrix3x18 = Eigen::Matrix<double, 3, 18>;
 /// Largest difference between the analytic and the numeric Jacobian, against the largest entry of the part it belongs to.
 template <class F>
 double jacobian_error(const F& f, Scene& s, double step) {
-  double e[3]{}, plus[3]{}, minus[3]{};
-  Matrix3x18 J = Matrix3x18::Zero(), numeric = Matrix3x18::Zero();
+  double e[3]{};
+  Matrix3x18 J = Matrix3x18::Zero(), numeric;
   f.linearise(s.values, e, {J.data(), 3});
-  const auto column = [&](int c, auto& value, const auto& d) {
-    const auto before = value;
-    value = before.retract(d), f.evaluate(s.values, plus);
-    value = before.retract(-d), f.evaluate(s.values, minus);
-    value = before;
-    numeric.col(c) = (Eigen::Map<Eigen::Vector3d>(plus) - Eigen::Map<Eigen::Vector3d>(minus)) / (2 * step);
-  };
-  for (int i = 0; i < 15; ++i) column(i, s.values.at(s.state), NavigationState::Step{step * NavigationState::Step::Unit(i)});
-  for (int i = 0; i < 3; ++i) column(15 + i, s.values.at(s.landmark), Landmark::Step{step * Landmark::Step::Unit(i)});
-  const auto part = [&](int first, int n) {
-    return (J.middleCols(first, n) - numeric.middleCols(first, n)).cwiseAbs().maxCoeff() / J.middleCols(first, n).cwiseAbs().maxCoeff();
-  };
+  numeric << numeric_columns<3>(f, s.values, s.state, step), numeric_columns<3>(f, s.values, s.landmark, step);
   CHECK(J.middleCols<9>(6).isZero(0));  // velocity and biases are not seen
   CHECK(numeric.middleCols<9>(6).isZero(0));
-  return std::max({part(0, 3), part(3, 3), part(15, 3)});
+  return std::max({part_error(J, numeric, 0, 3), part_error(J, numeric, 3, 3), part_error(J, numeric, 15, 3)});
 }
 
 }  // namespace

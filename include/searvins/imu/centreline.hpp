@@ -16,7 +16,7 @@
 ///     bent        the line ends or leaves its straight by more than a bound within k sqrt(t' P t) along it: who does not know how far round the bend
 ///                 p is does not know how far across the lane it is either
 ///
-/// sigma is how far drivers and map are from the middle of a lane. That offset lasts, so a user should not ask at every state (estimator: every_m).
+/// sigma is how far drivers and map are from the middle of a lane. That offset lasts, so a user should not ask at every state.
 #pragma once
 
 #include <Eigen/Core>
@@ -50,7 +50,6 @@ struct CentrelineOptions {
   bool both_ways{true};               ///< false: lines are driven in the order of their points only
   double min_speed_mps{2};
   double max_bend_m{0.5};             ///< how far the line may leave its straight over the uncertainty along it
-  double every_m{20};                 ///< way between two states that are told
 };
 
 /// What a match came to.

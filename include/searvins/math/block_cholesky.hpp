@@ -43,6 +43,26 @@ template <class Scalar>
   return Scalar(64) * std::numeric_limits<Scalar>::epsilon();
 }
 
+/// What becomes of a column of the factorisation.
+enum class PivotVerdict {
+  use,   ///< its root divides the column
+  skip,  ///< the column becomes zero
+  stop   ///< the report says why
+};
+
+/// The verdict on pivot j, noted in the report unless it is of use.
+template <class Scalar>
+[[nodiscard]] PivotVerdict judge_pivot(Scalar pivot, Scalar reference, int j, ZeroPivot policy, PivotReport<Scalar>& report) {
+  const bool is_finite = std::isfinite(pivot);
+  if (is_finite && pivot > zero_pivot_share<Scalar>() * reference && pivot > std::numeric_limits<Scalar>::min()) return PivotVerdict::use;
+  if (is_finite && policy == ZeroPivot::skip) {
+    ++report.skipped;
+    return PivotVerdict::skip;
+  }
+  report.failed = j, report.value = pivot, report.non_finite = !is_finite;
+  return PivotVerdict::stop;
+}
+
 namespace detail {
 
 /// column[first..n) -= sum_p A(j, p) A(first..n, p) for the panel columns p in [p0, p1): the inner product form, unit stride.
@@ -77,22 +97,14 @@ template <class Scalar>
     for (int j = k0; j < k1; ++j) {
       detail::subtract_outer(a, ld, n, j, k0, j);
       Scalar* const c = a + static_cast<std::ptrdiff_t>(j) * ld;
-      const Scalar pivot = c[j];
-      if (!std::isfinite(pivot)) {
-        report.failed = j, report.value = pivot, report.non_finite = true;
-        return report;
-      }
-      if (pivot <= zero_pivot_share<Scalar>() * reference[j] || pivot <= std::numeric_limits<Scalar>::min()) {
-        if (policy == ZeroPivot::fail) {
-          report.failed = j, report.value = pivot;
-          return report;
-        }
-        ++report.skipped;
+      const PivotVerdict verdict = judge_pivot(c[j], reference[j], j, policy, report);
+      if (verdict == PivotVerdict::stop) return report;
+      if (verdict == PivotVerdict::skip) {
         for (int i = j; i < n; ++i) c[i] = 0;
         continue;
       }
-      const Scalar root = std::sqrt(pivot), inverse = Scalar(1) / root;
-      c[j] = root;
+      c[j] = std::sqrt(c[j]);
+      const Scalar inverse = Scalar(1) / c[j];
       for (int i = j + 1; i < n; ++i) c[i] *= inverse;
     }
     for (int j = k1; j < n; ++j) detail::subtract_outer(a, ld, n, j, k0, k1);

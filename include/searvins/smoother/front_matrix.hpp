@@ -14,7 +14,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
 #include <searvins/math/block_cholesky.hpp>
 #include <searvins/smoother/symmetric_products.hpp>
@@ -135,18 +134,10 @@ class FrontMatrix {
     Scalar* const c = column(j);
     Scalar pivot = c[j];
     for (int p = done; p < j; ++p) pivot -= column(p)[j] * column(p)[j];
-    if (!std::isfinite(pivot)) {
-      report.failed = j, report.value = pivot, report.non_finite = true;
-      return false;
-    }
-    if (pivot <= math::zero_pivot_share<Scalar>() * reference || pivot <= std::numeric_limits<Scalar>::min()) {
-      if (policy == math::ZeroPivot::fail) {
-        report.failed = j, report.value = pivot;
-        return false;
-      }
-      ++report.skipped;
-      std::fill(c + j, c + border_ + 1, Scalar(0));
-      return true;
+    const math::PivotVerdict verdict = math::judge_pivot(pivot, reference, j, policy, report);
+    if (verdict != math::PivotVerdict::use) {
+      if (verdict == math::PivotVerdict::skip) std::fill(c + j, c + border_ + 1, Scalar(0));
+      return verdict == math::PivotVerdict::skip;
     }
     c[j] = std::sqrt(pivot);
     const Scalar inverse = 1 / c[j];
