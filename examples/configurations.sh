@@ -6,7 +6,7 @@
 #
 # DRIVE holds rover.obs, base.obs, *.nav or nav.rnx, imu.csv or imu.log, rig.json, truth.csv and stereo_tracks.csv (`searvins simulate` writes such a
 # folder). POS is a .pos file of another program: it is scored, and its positions are what is loosely coupled; without it those of a GNSS-only run
-# are. Environment: SEARVINS (the command; else build/release/searvins), START and END (seconds of week to solve and to score), ONLY (a pattern of the
+# are. Environment: SEARVINS (the command; else build/release/searvins), START and END (seconds of week to score; all is solved), ONLY (a pattern of the
 # configurations to run again; the rest is taken from an earlier call), JOBS (runs at a time, 1). Writes OUT/table.md, table.csv, figures.json,
 # compare.html.
 set -euo pipefail
@@ -32,10 +32,10 @@ first_of() {
 }
 nav=$(first_of "$drive"/nav.rnx "$drive"/*.nav)
 imu=$(first_of "$drive"/imu.csv "$drive"/imu.log)
-span=() score=()
-[ -z "${START:-}" ] || span+=(--start "$START") score+=(--start "$START")
-[ -z "${END:-}" ] || span+=(--end "$END") score+=(--end "$END")
-rover=(--rover "$drive/rover.obs" --nav "$nav" --rig "$drive/rig.json" --truth "$drive/truth.csv" "${span[@]}")
+score=()
+[ -z "${START:-}" ] || score+=(--start "$START")
+[ -z "${END:-}" ] || score+=(--end "$END")
+rover=(--rover "$drive/rover.obs" --nav "$nav" --rig "$drive/rig.json" --truth "$drive/truth.csv")
 both=("${rover[@]}" --base "$drive/base.obs")
 unit=(--imu "$imu")
 eyes=(--imu "$imu" --tracks "$drive/stereo_tracks.csv")
@@ -65,7 +65,7 @@ for form in batch scalar latent symmetric; do
 done
 wait
 positions=${pos:-$out/rtk_symmetric/solution.pos}
-loose=(--positions "$positions" --rig "$drive/rig.json" --truth "$drive/truth.csv" "${span[@]}")
+loose=(--positions "$positions" --rig "$drive/rig.json" --truth "$drive/truth.csv")
 run loose_imu "${loose[@]}" "${unit[@]}"
 run loose_imu_stereo "${loose[@]}" "${eyes[@]}"
 run no_robust_weights "${both[@]}" "${eyes[@]}" --without robust
