@@ -14,7 +14,7 @@ source "$root/cmake/install_packages.sh"
 
 build() {
   need_tools build eigen
-  (cd "$root" && cmake --preset release -Wno-dev >/dev/null && cmake --build --preset release -j "$(build_jobs)")
+  (cd "$root" && cmake --preset release -Wno-dev >/dev/null && cmake --build --preset release --target searvins_command -j "$(build_jobs)")
 }
 
 solve_synthetic() {

@@ -199,11 +199,13 @@ struct FixedLagProblem {
   static constexpr std::size_t arena_scalars = std::size_t{62} * (391 * 15 + 376 * 376 + 375);
 };
 
-/// Runs the workload frame by frame.
-class FixedLagRun {
+/// Runs the workload frame by frame. `Problem`: FixedLagProblem, or one with its types and other capacities.
+template <class Problem>
+class BasicFixedLagRun {
  public:
-  using Smoother = smoother::FixedLagSmoother<FixedLagProblem>;
-  static constexpr std::size_t kWindow = 61;  ///< states that stay after an update
+  using Smoother = smoother::FixedLagSmoother<Problem>;
+  using Options = typename Smoother::Options;
+  static constexpr std::size_t kWindow = 61;  ///< states that stay after an update, unless the constructor is told otherwise
 
   /// Everything that went wrong or was unusual.
   struct Counts {
@@ -212,8 +214,8 @@ class FixedLagRun {
     int damped_steps{0}, iterations{0}, fronts_factored{0};
   };
 
-  explicit FixedLagRun(const FixedLagWorkload& workload, const Smoother::Options& options)
-      : workload_(workload), options_(options), smoother_(std::make_unique<Smoother>()) {
+  explicit BasicFixedLagRun(const FixedLagWorkload& workload, const Options& options, std::size_t window = kWindow)
+      : workload_(workload), options_(options), window_(window), smoother_(std::make_unique<Smoother>()) {
     imu::PreintegrationOptions o;
     o.kind = imu::SampleKind::mean_to_stamp, o.noise = workload.noise;
     expect(motion_.start(workload_time(0), imu::ImuBias<double>{}, o).ok());
@@ -221,8 +223,8 @@ class FixedLagRun {
 
   /// So many Gauss-Newton steps an update; the solvers to compare with did two. A step that an outlier's track makes too long is halved rather
   /// than damped: no update costs several factorisations.
-  static Smoother::Options options_of(int iterations) {
-    Smoother::Options o;
+  static Options options_of(int iterations) {
+    Options o;
     o.max_iterations = iterations, o.max_step_halvings = 2;
     return o;
   }
@@ -245,7 +247,7 @@ class FixedLagRun {
     counts_.kept_back += stepped ? 0 : 1;
     counts_.damped_steps += report.damped_steps, counts_.iterations += report.iterations, counts_.fronts_factored += report.fronts_factored;
     if (const auto* x = smoother_->find(states_.back())) newest_.push_back({t_s, x->p_wb_m, so3::quaternion_from_matrix(x->R_wb)});
-    if (states_.size() > kWindow) leave();
+    if (states_.size() > window_) leave();
     ++frame_;
   }
 
@@ -282,7 +284,7 @@ class FixedLagRun {
     const auto key = smoother_->add_variable(x, time);
     if (!taken(key)) return;
     if (motion)
-      add(FixedLagProblem::ImuFactor::make(states_.back(), *key, *motion, workload_.noise, workload_.earth, x.p_wb_m));
+      add(Problem::ImuFactor::make(states_.back(), *key, *motion, workload_.noise, workload_.earth, x.p_wb_m));
     else
       add(imu::NavigationPriorFactor::make(*key, x, workload_.start_covariance));
     states_.push_back(*key), times_.push_back(time);
@@ -300,8 +302,8 @@ class FixedLagRun {
       add(vision::LandmarkPriorFactor::make(*key, p_w_m));
       known = landmarks_.emplace(s.landmark, *key).first;
     }
-    add(FixedLagProblem::StereoFactor::make(states_.back(), known->second, camera, s.pixel,
-                                            vision::pixel_covariance_px2(workload_.pixel_sigma_px)));
+    add(Problem::StereoFactor::make(states_.back(), known->second, camera, s.pixel,
+                                    vision::pixel_covariance_px2(workload_.pixel_sigma_px)));
   }
 
   void add_position(double t_s) {
@@ -321,7 +323,8 @@ class FixedLagRun {
   }
 
   const FixedLagWorkload& workload_;
-  Smoother::Options options_;
+  Options options_;
+  std::size_t window_;
   std::unique_ptr<Smoother> smoother_;
   imu::Preintegration<double, 32> motion_{};
   std::size_t frame_{0}, next_reading_{0}, next_position_{0};
@@ -331,5 +334,7 @@ class FixedLagRun {
   std::vector<WorkloadPose> newest_;
   Counts counts_;
 };
+
+using FixedLagRun = BasicFixedLagRun<FixedLagProblem>;
 
 }  // namespace searvins::test
