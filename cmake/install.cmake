@@ -14,7 +14,7 @@ configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/searvinsConfig.cmake.
 # While the version is 0.x a minor release may break; ARCH_INDEPENDENT lets a 32-bit cross build accept a package installed from a 64-bit host.
 write_basic_package_version_file("${PROJECT_BINARY_DIR}/searvinsConfigVersion.cmake" COMPATIBILITY SameMinorVersion ARCH_INDEPENDENT)
 install(FILES "${PROJECT_BINARY_DIR}/searvinsConfig.cmake" "${PROJECT_BINARY_DIR}/searvinsConfigVersion.cmake"
-  "${PROJECT_SOURCE_DIR}/cmake/embedded_eigen.hpp" DESTINATION "${searvins_package_dir}")
+  "${PROJECT_SOURCE_DIR}/cmake/embedded_eigen.hpp" "${PROJECT_SOURCE_DIR}/cmake/instances.cmake" DESTINATION "${searvins_package_dir}")
 
 configure_file("${PROJECT_SOURCE_DIR}/cmake/searvins.pc.in" "${PROJECT_BINARY_DIR}/searvins.pc" @ONLY)
 install(FILES "${PROJECT_BINARY_DIR}/searvins.pc" DESTINATION "${CMAKE_INSTALL_DATADIR}/pkgconfig")

@@ -38,12 +38,16 @@ solve_drive() {
     "$searvins" solve "${common[@]}" --out "$runs/$name" "$@" >"$runs/$name.txt" || [ $? -eq 4 ]  # 4: no solution at the end, still scored
   }
   mkdir -p "$runs"
+  # The longest one beside the others; its progress is kept aside.
+  solve_one stereo_from_pictures --imu "$drive/imu.csv" --rig "$drive/rig_images.json" --images "$drive" 2>"$runs/stereo_from_pictures.progress" &
+  local from_pictures=$!
   solve_one GNSS --rig "$drive/rig.json"
   solve_one GNSS+IMU "${unit[@]}"
   for run in scalar latent symmetric; do
     solve_one "stereo_$run" "${unit[@]}" --tracks "$drive/stereo_tracks.csv" --robust "$run"
   done
-  solve_one stereo_from_pictures --imu "$drive/imu.csv" --rig "$drive/rig_images.json" --images "$drive"
+  echo "solve: waiting for the run from pictures"
+  wait "$from_pictures" || { cat "$runs/stereo_from_pictures.progress" >&2 && return 1; }
   echo "The rows of the paper in the tables are of its own drive, 20 km of downtown streets: for scale, not for comparison."
   "$searvins" evaluate --truth "$drive/truth.csv" --start 274800 --end 274860 --paper --streets "$drive/streets.csv" --report "$out/drive.html" \
     "GNSS=$runs/GNSS" "GNSS+IMU=$runs/GNSS+IMU" "stereo scalar=$runs/stereo_scalar" "stereo latent=$runs/stereo_latent" \

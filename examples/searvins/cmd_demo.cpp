@@ -25,11 +25,6 @@ fs::path data_folder(const std::string& given) {
   return fs::path{"examples/data"} / name;
 }
 
-int unusable(const io::Diagnostic& error) {
-  std::fprintf(stderr, "searvins demo: %s\n", io::to_string(error).c_str());
-  return kExitUnusableInput;
-}
-
 /// Fewer wrong fixes, then the smaller error.
 bool is_better(const Evaluation& a, const Evaluation& b) {
   if (a.wrong_fixes != b.wrong_fixes) return a.wrong_fixes < b.wrong_fixes;
@@ -52,7 +47,7 @@ int run_demo(int argc, const char* const* argv) {
   request.nav = {(data / "nav.rnx").string()}, request.truth = (data / "truth.csv").string();
   if (fs::exists(data / "rig.json")) request.rig = (data / "rig.json").string();
   const io::FileResult<SolveInputs> inputs = prepare(request);
-  if (!inputs) return unusable(inputs.error());
+  if (!inputs) return unusable_input("demo", inputs.error());
 
   std::vector<NamedEvaluation> runs;
   std::string best;
@@ -64,9 +59,9 @@ int run_demo(int argc, const char* const* argv) {
                       (request.rig.empty() ? "" : " --rig " + request.rig) + " --truth " + request.truth + " --robust " + formulation +
                       " --out " + folder;
     const io::FileResult<SolveOutcome> outcome = solve(request, *inputs);
-    if (!outcome) return unusable(outcome.error());
+    if (!outcome) return unusable_input("demo", outcome.error());
     if (const std::string wrong = write_outputs(folder, request, *inputs, *outcome); !wrong.empty())
-      return unusable({folder, 0, wrong, "choose another folder with --out"});
+      return unusable_input("demo", {folder, 0, wrong, "choose another folder with --out"});
     all_solved = all_solved && outcome->solved_at_end;
     if (!outcome->evaluation) continue;
     if (best.empty() || is_better(*outcome->evaluation, runs.front().evaluation))
@@ -75,13 +70,13 @@ int run_demo(int argc, const char* const* argv) {
       runs.push_back({formulation, *outcome->evaluation});
   }
   if (runs.empty())
-    return unusable({request.truth, 0, "no epoch of the recording can be scored against it", "check that both are of the same day"});
+    return unusable_input("demo", {request.truth, 0, "no epoch of the recording can be scored against it", "check that both are of the same day"});
   std::fputs(evaluation_text(runs).c_str(), stdout);
 
   std::error_code failed;
   fs::copy_file(out / best / "report.html", out / "report.html", fs::copy_options::overwrite_existing, failed);
   if (failed)
-    return unusable({(out / "report.html").string(), 0, "could not be written: " + failed.message(), "choose another folder with --out"});
+    return unusable_input("demo", {(out / "report.html").string(), 0, "could not be written: " + failed.message(), "choose another folder with --out"});
   std::printf("\nThe recording is synthetic and GNSS only. Report of the best run (%s): %s\n", best.c_str(),
               (out / "report.html").string().c_str());
   return all_solved ? kExitDone : kExitDegraded;

@@ -45,11 +45,6 @@ OptionParser evaluate_parser() {
   return parser;
 }
 
-int unusable(const io::Diagnostic& error) {
-  std::fprintf(stderr, "searvins evaluate: %s\n", io::to_string(error).c_str());
-  return kExitUnusableInput;
-}
-
 /// "a, b and c".
 std::string title_of(const std::vector<AssessedRun>& runs) {
   std::string text;
@@ -152,14 +147,14 @@ int run_evaluate(int argc, const char* const* argv) {
   if (options.flag("paper")) table = paper_rows();
   for (const std::string& given : options.positionals()) {
     io::FileResult<AssessedRun> run = assess_file(given, request);
-    if (!run) return unusable(run.error());
+    if (!run) return unusable_input("evaluate", run.error());
     table.push_back(paper_table_row(run->name, run->sensors, run->evaluation, digits));
     runs.push_back(std::move(run).value());
   }
   std::fputs((paper_table_text(table) + '\n' + assessment_text(runs)).c_str(), stdout);
   std::string command = "searvins evaluate";
   for (int i = 1; i < argc; ++i) (command += ' ') += argv[i];
-  if (const io::Diagnostic wrong = write_files(options, table, std::move(runs), command); !wrong.message.empty()) return unusable(wrong);
+  if (const io::Diagnostic wrong = write_files(options, table, std::move(runs), command); !wrong.message.empty()) return unusable_input("evaluate", wrong);
   return kExitDone;
 }
 

@@ -30,11 +30,6 @@ namespace {
 
 namespace sim = searvins::simulator;
 
-int unusable(const io::Diagnostic& error) {
-  std::fprintf(stderr, "searvins simulate: %s\n", io::to_string(error).c_str());
-  return kExitUnusableInput;
-}
-
 /// A broadcast record as the simulator flies it: without the quadratic term of the clock, which is referred to toe.
 sim::Orbit orbit_from(const gnss::Ephemeris& e, GpsTime start) {
   sim::Orbit o;
@@ -200,24 +195,24 @@ int run_simulate(int argc, const char* const* argv) {
   std::vector<gnss::Ephemeris> records;
   if (options.given("nav")) {
     auto read = read_records(options.text("nav"));
-    if (!read) return unusable(read.error());
+    if (!read) return unusable_input("simulate", read.error());
     records = std::move(*read);
     wanted.start = GpsTime{records[records.size() / 2].toe.ns / kNanosecondsPerSecond * kNanosecondsPerSecond};
   }
   if (options.given("route"))
     if (const io::Diagnostic wrong = take_route(options.text("route"), options.given("duration"), wanted); !wrong.message.empty())
-      return unusable(wrong);
+      return unusable_input("simulate", wrong);
   if (options.given("nav")) {
     wanted.orbits = orbits_of(records, wanted);
     if (wanted.orbits.size() < 8)
-      return unusable(
+      return unusable_input("simulate", 
           {options.text("nav"), 0, "fewer than eight satellites have a record within two hours of the drive", "give the day's file"});
   }
 
   const std::filesystem::path folder{options.text("out")};
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
-  if (failed) return unusable({folder.string(), 0, "could not be made: " + failed.message(), "choose another folder with --out"});
+  if (failed) return unusable_input("simulate", {folder.string(), 0, "could not be made: " + failed.message(), "choose another folder with --out"});
   Progress progress("simulate", 100);
   const sim::Simulation simulation(wanted);
   const std::string form = options.text("layout");
@@ -229,11 +224,11 @@ int run_simulate(int argc, const char* const* argv) {
       simulation, layout, [&progress](double share) { progress.update(static_cast<std::size_t>(std::max(0.0, 100 * share))); });
   for (const sim::DatasetFile& file : set.files)
     if (const std::string wrong = io::write_text_file((folder / file.name).string(), file.text); !wrong.empty())
-      return unusable({(folder / file.name).string(), 0, wrong, "choose another folder with --out"});
+      return unusable_input("simulate", {(folder / file.name).string(), 0, wrong, "choose another folder with --out"});
   progress.finish();
   print_summary(simulation, set, folder.string());
   if (images)
-    if (const io::Diagnostic wrong = write_pictures(simulation, layout, *images, folder); !wrong.message.empty()) return unusable(wrong);
+    if (const io::Diagnostic wrong = write_pictures(simulation, layout, *images, folder); !wrong.message.empty()) return unusable_input("simulate", wrong);
   return kExitDone;
 }
 

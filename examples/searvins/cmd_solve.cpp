@@ -27,11 +27,15 @@ OptionParser solve_parser() {
   parser.value("positions", "FILE", "another program's positions (.pos, or week,sow,x,y,z[,sd..]) instead of --rover, --base and --nav: loosely coupled");
   parser.value("tracks", "FILE", "stereo tracks of a frontend, pixels of the rectified pair that --rig describes; with --imu");
   parser.value("images", "DIR", "stereo pictures in the EuRoC layout (cam0, cam1, labels0) instead of --tracks: the reference frontend finds and follows points");
-  parser.value("without", "LIST", "parts to switch off: semantic, geometric, motion, maturity of the screening of tracks; stereo, right pixels as measurements; robust, the weights of GNSS");
+  parser.value("without", "LIST",
+               "parts to switch off: semantic, geometric, motion, maturity of the screening of tracks; stereo, right pixels as measurements; robust, the "
+               "weights of GNSS");
   parser.value("with", "LIST",
                "policies that are off by default: wheels (no sliding, with --imu), cn0 (codes of weak signals count less), code-gate (codes 5 sigmas off the "
-               "prediction are left out), batch-size (batch weights by the mean square of a batch)");
+               "prediction are left out), batch-size (batch weights by the mean square of a batch), predicted-motion (phases of few satellites "
+               "verified by the inertial unit, with --imu)");
   parser.flag("calibrate-camera", "also estimate the time offset and the boresight of the camera (docs/vision.md); --robust symmetric");
+  parser.value("map", "FILE", "centre lines of lanes (line,lat_deg,lon_deg,height_m), which hold the vehicle where no integers do; with --imu");
   parser.value("heading", "DEG[,SIGMA]", "heading at the start, clockwise from north, and its sigma; else found from the motion");
   parser.value("base-ecef", "X,Y,Z", "antenna of the base, ECEF metres; else the rig's, else that of the base file's header");
   parser.value("robust", "FORM", "robust formulation").fallback(kDefaultFormulation).one_of({"batch", "scalar", "latent", "symmetric"});
@@ -101,7 +105,8 @@ void take_policies(Options& options, SolveRequest& request, bool is_dataset) {
   }
   for (const std::string& policy : request.with)
     if (!is_one_of(kPolicies, policy)) options.fail("--with: '" + policy + "' is none of " + joined(kPolicies));
-  if (request.is_with("wheels") && request.imu.empty() && !is_dataset) options.fail("--with wheels needs --imu FILE");
+  for (const char* policy : {"wheels", "predicted-motion"})
+    if (request.is_with(policy) && request.imu.empty() && !is_dataset) options.fail(std::string{"--with "} + policy + " needs --imu FILE");
   if (request.is_with("batch-size") && options.text("robust") != "batch") options.fail("--with batch-size needs --robust batch");
 }
 
@@ -117,6 +122,8 @@ void take_imu(Options& options, SolveRequest& request) {
   if (request.calibrate_camera && !request.has_camera() && !is_dataset) options.fail("--calibrate-camera needs --tracks FILE or --images DIR");
   if (request.calibrate_camera && options.text("robust") != kCalibratingFormulation)
     options.fail(std::string{"--calibrate-camera needs --robust "} + kCalibratingFormulation);
+  request.map = options.text("map");
+  if (!request.map.empty() && request.imu.empty() && !is_dataset) options.fail("--map needs --imu FILE");
   if (options.given("heading")) {
     const std::vector<double> heading = options.numbers("heading", options.list("heading").size() == 2 ? 2 : 1);
     if (!heading.empty()) request.heading_deg = heading[0];
@@ -165,8 +172,8 @@ void check_dataset(Options& options) {
   for (const char* name : {"tracks", "images", "without", "calibrate-camera"})
     if (options.given(name) && sensors != "all") options.fail(std::string{"--"} + name + " needs --sensors all");
   if (options.text("rate") == "camera" && sensors != "all") options.fail("--rate camera needs --sensors all");
-  if ((options.text("rate") == "imu" || options.given("heading")) && sensors == "gnss")
-    options.fail("--rate imu and --heading need --sensors imu or all");
+  if ((options.text("rate") == "imu" || options.given("heading") || options.given("map")) && sensors == "gnss")
+    options.fail("--rate imu, --heading and --map need --sensors imu or all");
 }
 
 SolveRequest request_of(Options& options) {
@@ -196,11 +203,6 @@ SolveRequest request_of(Options& options) {
   return request;
 }
 
-int unusable(const io::Diagnostic& error) {
-  std::fprintf(stderr, "searvins solve: %s\n", io::to_string(error).c_str());
-  return kExitUnusableInput;
-}
-
 }  // namespace
 
 int run_solve(int argc, const char* const* argv) {
@@ -221,17 +223,17 @@ int run_solve(int argc, const char* const* argv) {
     const DatasetWish wish{options.text("dataset"), options.positionals().front(),
                            (std::filesystem::path{options.text("out")} / "inputs").string(), sensors != "gnss", sensors == "all"};
     io::FileResult<DatasetRequest> made = dataset_request(wish, request);
-    if (!made) return unusable(made.error());
+    if (!made) return unusable_input("solve", made.error());
     request = std::move(made->request), notes = std::move(made->notes);
   }
   io::FileResult<SolveInputs> inputs = prepare(request);
-  if (!inputs) return unusable(inputs.error());
+  if (!inputs) return unusable_input("solve", inputs.error());
   inputs->notes.insert(inputs->notes.begin(), notes.begin(), notes.end());
   const io::FileResult<SolveOutcome> outcome = solve(request, *inputs);
-  if (!outcome) return unusable(outcome.error());
+  if (!outcome) return unusable_input("solve", outcome.error());
   const std::string folder = options.text("out");
   if (const std::string wrong = write_outputs(folder, request, *inputs, *outcome); !wrong.empty())
-    return unusable({folder, 0, wrong, "choose another folder with --out"});
+    return unusable_input("solve", {folder, 0, wrong, "choose another folder with --out"});
   std::fputs(summary_text(request, *inputs, *outcome).c_str(), stdout);
   std::printf("\nresults in %s; open %s/report.html in a browser\n", folder.c_str(), folder.c_str());
   if (outcome->solved_at_end) return kExitDone;

@@ -35,7 +35,7 @@ OptionParser euroc_parser() {
   return parser;
 }
 
-EurocRequest request_of(Options& options) {
+EurocRequest euroc_request_of(Options& options) {
   EurocRequest request;
   if (!options.positionals().empty()) request.folder = options.positionals().front();
   request.truth = options.text("truth"), request.truth_is_left_camera = options.given("truth-is-left-camera");
@@ -55,25 +55,20 @@ EurocRequest request_of(Options& options) {
   return request;
 }
 
-int unusable(const io::Diagnostic& error) {
-  std::fprintf(stderr, "searvins solve: %s\n", io::to_string(error).c_str());
-  return kExitUnusableInput;
-}
-
 }  // namespace
 
 int run_solve_euroc(int argc, const char* const* argv) {
   Options options = euroc_parser().parse(argc, argv);
-  EurocRequest request = request_of(options);
+  EurocRequest request = euroc_request_of(options);
   if (const auto code = options.finished()) return *code;
   request.command = "searvins solve";
   for (int i = 1; i < argc; ++i) (request.command += ' ') += argv[i];
 
   const io::FileResult<EurocOutcome> outcome = solve_euroc(request);
-  if (!outcome) return unusable(outcome.error());
+  if (!outcome) return unusable_input("solve", outcome.error());
   const std::string folder = options.text("out");
   if (const std::string wrong = write_outputs(folder, request, *outcome); !wrong.empty())
-    return unusable({folder, 0, wrong, "choose another folder with --out"});
+    return unusable_input("solve", {folder, 0, wrong, "choose another folder with --out"});
   std::fputs(summary_text(request, *outcome).c_str(), stdout);
   std::printf("\nresults in %s; open %s/report.html in a browser\n", folder.c_str(), folder.c_str());
   if (outcome->is_solved_at_end()) return kExitDone;

@@ -39,12 +39,6 @@ double milliseconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
-void add_count(std::vector<std::pair<std::string, long>>& counts, const std::string& what, long n = 1) {
-  for (auto& [text, count] : counts)
-    if (text == what) return void(count += n);
-  counts.emplace_back(what, n);
-}
-
 imu::ImuNoise noise_of(const EurocRecording& recording) {
   imu::ImuNoise noise;
   if (const auto& n = recording.imu_noise) {

@@ -32,6 +32,7 @@
 #include <searvins/io/file_result.hpp>
 
 #include "examples/searvins/solver_run.hpp"
+#include "examples/support/counts.hpp"
 #include "examples/support/strip_picture.hpp"
 #include "examples/support/trajectory_alignment.hpp"
 
@@ -91,7 +92,7 @@ struct EurocOutcome {
   std::string truth_source;  ///< empty: none
   std::optional<EurocErrors> errors;
   std::vector<StripPicture> strip;
-  std::vector<std::pair<std::string, long>> incidents;
+  std::vector<Count> incidents;
   std::vector<std::string> notes;
   double wall_s{0};
 

@@ -24,7 +24,7 @@
 namespace searvins::examples {
 namespace {
 
-using Counts = std::vector<std::pair<std::string, long>>;
+using Counts = std::vector<Count>;
 
 std::vector<double> of_frames(const EurocOutcome& out, const std::function<double(const EurocFrame&)>& value) {
   std::vector<double> values;

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <searvins/core/time.hpp>
@@ -16,6 +15,7 @@
 #include <searvins/vision/image_view.hpp>
 
 #include "examples/searvins/solver_run.hpp"
+#include "examples/support/counts.hpp"
 
 namespace searvins::examples {
 
@@ -35,7 +35,7 @@ class FrameSource {
   /// The rectified left picture of the frame taken last; not valid where there is none.
   [[nodiscard]] virtual vision::ImageView picture() const { return {}; }
   /// What was left out, by reason.
-  [[nodiscard]] virtual std::vector<std::pair<std::string, long>> left_out() const = 0;
+  [[nodiscard]] virtual std::vector<Count> left_out() const = 0;
 };
 
 }  // namespace searvins::examples

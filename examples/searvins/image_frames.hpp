@@ -30,6 +30,7 @@
 #include "examples/orb_frontend/orb_frontend.hpp"
 #include "examples/orb_frontend/remap.hpp"
 #include "examples/searvins/frame_source.hpp"
+#include "examples/support/counts.hpp"
 #include "examples/support/gray_image.hpp"
 #include "examples/support/image_reader.hpp"
 
@@ -141,8 +142,8 @@ class ImageFrames final : public FrameSource {
     return true;
   }
 
-  [[nodiscard]] std::vector<std::pair<std::string, long>> left_out() const override {
-    std::vector<std::pair<std::string, long>> items(left_out_.begin(), left_out_.end());
+  [[nodiscard]] std::vector<Count> left_out() const override {
+    std::vector<Count> items(left_out_.begin(), left_out_.end());
     for (const io::SkippedItem& item : skipped_.items()) items.emplace_back("pictures: " + item.reason, static_cast<long>(item.count));
     return items;
   }

@@ -40,6 +40,11 @@ std::string usage() {
 
 }  // namespace
 
+int searvins::examples::unusable_input(const char* command, const io::Diagnostic& error) {
+  std::fprintf(stderr, "searvins %s: %s\n", command, io::to_string(error).c_str());
+  return kExitUnusableInput;
+}
+
 int main(int argc, char** argv) {
   const std::string_view name = argc > 1 ? argv[1] : "";
   if (name.empty()) return std::fputs(usage().c_str(), stderr), kExitUsage;

@@ -72,7 +72,9 @@ class RtkRun final : public EpochRun {
 template <template <class> class Form, class Motion = estimator::StereoInertialMotion<>>
 class InertialRun final : public SolverRun {
  public:
-  InertialRun(const RunOptions& options, const Policies<Form>& policies) : estimator_(whole(options), policies.code_phase, policies.doppler) {}
+  InertialRun(const RunOptions& options, const Policies<Form>& policies) : estimator_(whole(options), policies.code_phase, policies.doppler) {
+    estimator_.set_centrelines(options.lanes);
+  }
 
   Status add_ephemeris(const gnss::Ephemeris& ephemeris) override { return estimator_.add_ephemeris(ephemeris); }
   void set_ionosphere(const gnss::KlobucharCoefficients& coefficients) override { estimator_.set_ionosphere(coefficients); }

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <filesystem>
 #include <iterator>
-#include <numbers>
 #include <string>
 #include <system_error>
 #include <vector>
 
 #include <searvins/geodesy/wgs84.hpp>
 #include <searvins/gnss/weighting.hpp>
+#include <searvins/io/centreline_file.hpp>
 #include <searvins/io/imu_check.hpp>
 #include <searvins/io/imu_log.hpp>
 #include <searvins/io/pos_file.hpp>
@@ -19,11 +19,11 @@
 #include <searvins/io/text_fields.hpp>
 
 #include "examples/searvins/solve_job.hpp"
+#include "examples/support/angle_units.hpp"
 
 namespace searvins::examples {
 namespace {
 
-constexpr double kRad = std::numbers::pi / 180;
 constexpr double kFarthestEphemerisS = 4 * 3600.0;  ///< the longest age that the library accepts
 
 std::string time_text(GpsTime t) {
@@ -164,11 +164,11 @@ Failure take_sigmas(const SolveRequest& request, const std::optional<RigGnss>& r
 void take_screening(const SolveRequest& request, const std::optional<RigGnss>& rig, SolveInputs& in) {
   gnss::Screening& screening = in.options.differencing.screening;
   if (rig) {
-    screening.elevation_mask_rad = rig->elevation_mask_deg * kRad;
+    screening.elevation_mask_rad = rig->elevation_mask_deg * kRadPerDeg;
     screening.min_cn0_dbhz = rig->min_cn0_dbhz;
     in.options.differencing.base.max_age_s = rig->max_base_age_s;
   }
-  if (request.mask_deg) screening.elevation_mask_rad = *request.mask_deg * kRad;
+  if (request.mask_deg) screening.elevation_mask_rad = *request.mask_deg * kRadPerDeg;
   if (request.min_cn0_dbhz) screening.min_cn0_dbhz = *request.min_cn0_dbhz;
 }
 
@@ -253,6 +253,11 @@ Failure take_unit(const SolveRequest& request, const Rig& rig, SolveInputs& in) 
   inertial.preintegration.kind = is_mean ? imu::SampleKind::mean_to_stamp : imu::SampleKind::instantaneous;
   inertial.lever_arm_b_m = rig.R_rfu_b * *rig.lever_arm_b_m;
   inertial.non_holonomic = request.is_with("wheels");
+  if (!request.map.empty()) {
+    auto lanes = io::read_centrelines(request.map);
+    if (!lanes) return lanes.error();
+    in.lanes = std::move(lanes).value();
+  }
   return {};
 }
 
@@ -260,6 +265,7 @@ constexpr double kCodeGateSigmas = 5;
 
 /// Policies of --with that GNSS alone has.
 void take_policies(const SolveRequest& request, SolveInputs& in) {
+  if (request.is_with("predicted-motion")) in.options.differencing.slips.predicted_motion = true;
   if (request.is_with("cn0")) in.options.differencing.cn0_weighting = true;
   if (request.is_with("code-gate")) in.options.code_gate_sigmas = kCodeGateSigmas;
 }
@@ -393,12 +399,6 @@ Failure take_positions(const SolveRequest& request, SolveInputs& in) {
 }
 
 }  // namespace
-
-void add_count(std::vector<Count>& counts, const std::string& what, long n) {
-  for (Count& c : counts)
-    if (c.first == what) return void(c.second += n);
-  counts.emplace_back(what, n);
-}
 
 io::FileResult<SolveInputs> prepare(const SolveRequest& request) {
   SolveInputs in;

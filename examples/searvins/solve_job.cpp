@@ -6,7 +6,6 @@
 #include <deque>
 #include <map>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -18,13 +17,13 @@
 
 #include "examples/searvins/solve_job.hpp"
 #include "examples/searvins/track_frames.hpp"
+#include "examples/support/angle_units.hpp"
 #include "examples/support/frame_strip.hpp"
 #include "examples/support/progress.hpp"
 
 namespace searvins::examples {
 namespace {
 
-constexpr double kDeg = 180 / std::numbers::pi;
 constexpr std::int64_t kBaseLeadNs = 20'000'000;  ///< base tags may lie this much after the rover's: both clocks are off by up to 10 ms
 constexpr double kSkyStepS = 5;                   ///< between two points of a satellite's path in the report
 constexpr double kEndS = 10;                      ///< a run whose last GNSS solution is older than this at the end has ended without one
@@ -55,8 +54,8 @@ io::TrajectoryRow row_of(const estimator::RtkSolution& s, double solve_ms) {
   row.solve_ms = solve_ms;
   if (s.has_attitude) {
     const imu::AttitudeAngles a = imu::attitude_angles(s.R_nb);
-    row.roll_deg = a.roll_rad * kDeg, row.pitch_deg = a.pitch_rad * kDeg;
-    row.heading_deg = a.heading_rad * kDeg + (a.heading_rad < 0 ? 360 : 0);
+    row.roll_deg = a.roll_rad * kDegPerRad, row.pitch_deg = a.pitch_rad * kDegPerRad;
+    row.heading_deg = a.heading_rad * kDegPerRad + (a.heading_rad < 0 ? 360 : 0);
   }
   return row;
 }
@@ -66,9 +65,9 @@ void take_motion(const estimator::RtkSolution& s, ReportEpoch& epoch) {
   epoch.sd_velocity_enu_mps = s.velocity_covariance_enu.diagonal().cwiseMax(0.0).cwiseSqrt();
   if (!s.has_attitude) return;
   const double heading = imu::heading_of(s.R_nb), east = std::sin(heading), north = std::cos(heading);
-  const Eigen::Vector3d sd_deg = s.attitude_sigma_rad * kDeg;
+  const Eigen::Vector3d sd_deg = s.attitude_sigma_rad * kDegPerRad;
   epoch.sd_attitude_deg = {std::hypot(east * sd_deg.x(), north * sd_deg.y()), std::hypot(north * sd_deg.x(), east * sd_deg.y()), sd_deg.z()};
-  epoch.accel_bias_mps2 = s.accel_bias_b_mps2, epoch.gyro_bias_dps = s.gyro_bias_b_radps * kDeg;
+  epoch.accel_bias_mps2 = s.accel_bias_b_mps2, epoch.gyro_bias_dps = s.gyro_bias_b_radps * kDegPerRad;
 }
 
 const char* name_of(gnss::CodeFate fate) {
@@ -111,6 +110,7 @@ class Collector {
     out_.released_integers += s.released_integers;
     out_.restarts += s.restarted && out_.rows.size() > 1;
     if (!s.smoother_status.ok()) add_count(out_.incidents, std::string{"optimisation: "} + s.smoother_status.what);
+    if (s.in_lane) add_count(out_.incidents, "held in a lane of the map");
     if (satellites_seen < 0)
       add_count(out_.incidents, "no rover epoch: carried on by the inertial unit");
     else if (with_base_)
@@ -184,7 +184,7 @@ class Collector {
       ReportSatellite& satellite = sky_[name];
       satellite.name = name;
       const double share = rejected + used > 0 ? std::min(1.0, rejected / (rejected + used)) : 1;
-      satellite.points.push_back({row.azimuth_rad * kDeg, row.elevation_rad * kDeg, row.cn0_dbhz, share});
+      satellite.points.push_back({row.azimuth_rad * kDegPerRad, row.elevation_rad * kDegPerRad, row.cn0_dbhz, share});
     }
   }
 
@@ -527,7 +527,7 @@ io::FileResult<bool> feed(const SolveRequest& request, const SolveInputs& in, Me
 namespace {
 
 RunOptions run_options(const SolveRequest& request, const SolveInputs& in) {
-  RunOptions o{.rtk = in.options, .inertial = in.inertial, .calibrate_camera = request.calibrate_camera};
+  RunOptions o{.rtk = in.options, .inertial = in.inertial, .lanes = in.lanes, .calibrate_camera = request.calibrate_camera};
   o.robust = !request.is_without(kRobustPart), o.batch_by_size = request.is_with("batch-size");
   return o;
 }
@@ -547,7 +547,7 @@ io::FileResult<SolveOutcome> solve(const SolveRequest& request, const SolveInput
     if (const Status s = run->set_base_position(in.base_position_e_m); !s.ok())
       return io::Diagnostic{request.base, 0, s.what, "give --base-ecef X,Y,Z"};
   if (request.heading_deg)
-    if (const Status s = run->set_heading(imu::wrapped(*request.heading_deg / kDeg), request.heading_sigma_deg / kDeg);
+    if (const Status s = run->set_heading(imu::wrapped(*request.heading_deg / kDegPerRad), request.heading_sigma_deg / kDegPerRad);
         !s.ok() && s.code != StatusCode::under_determined)  // kept until the unit is levelled
       return io::Diagnostic{"--heading", 0, s.what, "give DEG or DEG,SIGMA"};
 

@@ -16,6 +16,7 @@
 
 #include <searvins/estimator/rtk_options.hpp>
 #include <searvins/gnss/ephemeris.hpp>
+#include <searvins/imu/centreline.hpp>
 #include <searvins/imu/imu_sample.hpp>
 #include <searvins/imu/position_fix.hpp>
 #include <searvins/io/file_result.hpp>
@@ -24,6 +25,7 @@
 
 #include "examples/searvins/image_frames.hpp"
 #include "examples/searvins/solver_run.hpp"
+#include "examples/support/counts.hpp"
 #include "examples/support/evaluation.hpp"
 #include "examples/support/rig.hpp"
 #include "examples/support/run_report.hpp"
@@ -39,7 +41,7 @@ inline constexpr const char* kDefaultSigmaProfile = "general";
 inline constexpr std::array kScreeningParts{"semantic", "geometric", "motion", "maturity", "stereo"};
 inline constexpr const char* kRobustPart = "robust";
 /// Policies that `--with` switches on.
-inline constexpr std::array kPolicies{"wheels", "cn0", "code-gate", "batch-size"};
+inline constexpr std::array kPolicies{"wheels", "cn0", "code-gate", "batch-size", "predicted-motion"};
 
 /// What was asked for.
 struct SolveRequest {
@@ -56,6 +58,7 @@ struct SolveRequest {
   std::string images{};                    ///< folder of stereo pictures, instead of tracks: the reference frontend makes them
   std::vector<std::string> without{};      ///< parts that are switched off: of the screening of tracks, or kRobustPart
   std::vector<std::string> with{};         ///< policies that are off by default: kPolicies
+  std::string map{};                       ///< centre lines of lanes, with an inertial unit
   bool calibrate_camera{false};            ///< time offset and boresight of the camera are estimated
   std::optional<double> heading_deg{};     ///< at the beginning, from elsewhere
   double heading_sigma_deg{5};
@@ -88,14 +91,10 @@ struct SolveInputs {
   std::optional<estimator::StereoInertialOptions> inertial{};
   std::vector<imu::ImuSample> imu{};  ///< readings of the time to solve, in body axes
   double imu_interval_s{0};
+  std::vector<imu::CentrelinePoint> lanes{};  ///< of request.map
   ImageFrameOptions image_options{};  ///< of request.images
   std::vector<std::string> notes;  ///< what a user should know
 };
-
-/// Something that happened so many times.
-using Count = std::pair<std::string, long>;
-/// Adds `n` to the count of a text.
-void add_count(std::vector<Count>& counts, const std::string& what, long n = 1);
 
 /// Something that happened to the alignment of the inertial unit.
 struct AlignmentEvent {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <filesystem>
 #include <iterator>
-#include <numbers>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -16,6 +15,7 @@
 #include <searvins/version.hpp>
 
 #include "examples/searvins/solve_job.hpp"
+#include "examples/support/angle_units.hpp"
 #include "examples/support/assessment.hpp"
 #include "examples/support/evaluation_tables.hpp"
 #include "examples/support/json_writer.hpp"
@@ -25,7 +25,6 @@
 namespace searvins::examples {
 namespace {
 
-constexpr double kDeg = 180 / std::numbers::pi;
 
 std::string percent(std::size_t part, long whole) {
   return whole > 0 ? io::fixed_text(100.0 * static_cast<double>(part) / static_cast<double>(whole), 2) + " %" : "-";
@@ -134,7 +133,7 @@ void append_camera_correction(const vision::CameraCorrectionEstimate& found, std
   const Eigen::Vector4d sigma = sigmas_of(found);
   lines.emplace_back("camera time offset", io::fixed_text(1e3 * found.value.time_offset_s, 2) + " +- " + io::fixed_text(1e3 * sigma[0], 2) + " ms");
   lines.emplace_back("camera boresight (right, down, forward)",
-                     vector_text(found.value.boresight_rad() * kDeg, 3) + " +- " + vector_text(sigma.tail<3>() * kDeg, 3) + " deg");
+                     vector_text(found.value.boresight_rad() * kDegPerRad, 3) + " +- " + vector_text(sigma.tail<3>() * kDegPerRad, 3) + " deg");
 }
 
 void append_stereo_figures(const SolveOutcome& outcome, std::vector<ReportEntry>& lines) {
@@ -216,7 +215,7 @@ std::vector<ReportEntry> settings(const SolveRequest& request, const SolveInputs
     s.emplace_back("least success rate", io::fixed_text(in.options.resolution.min_success_rate, 2));
     s.emplace_back("least ratio", io::fixed_text(in.options.resolution.min_ratio, 2));
     s.emplace_back("sigma profile", request.sigma_profile);
-    s.emplace_back("elevation mask", io::fixed_text(in.options.differencing.screening.elevation_mask_rad * kDeg, 1) + " deg");
+    s.emplace_back("elevation mask", io::fixed_text(in.options.differencing.screening.elevation_mask_rad * kDegPerRad, 1) + " deg");
     s.emplace_back("least C/N0", io::fixed_text(in.options.differencing.screening.min_cn0_dbhz, 1) + " dB-Hz");
   }
   if (in.inertial) {
@@ -337,8 +336,8 @@ void member_inertial(JsonWriter& json, const SolveOutcome& outcome) {
 void member_camera_correction(JsonWriter& json, const vision::CameraCorrectionEstimate& found) {
   const Eigen::Vector4d sigma = sigmas_of(found);
   json.begin_object("camera_correction").member("time_offset_s", found.value.time_offset_s).member("time_offset_sigma_s", sigma[0]);
-  member_vector(json, "boresight_deg", found.value.boresight_rad() * kDeg);
-  member_vector(json, "boresight_sigma_deg", sigma.tail<3>() * kDeg);
+  member_vector(json, "boresight_deg", found.value.boresight_rad() * kDegPerRad);
+  member_vector(json, "boresight_sigma_deg", sigma.tail<3>() * kDegPerRad);
   json.end_object();
 }
 

@@ -21,6 +21,7 @@
 #include <searvins/gnss/ephemeris.hpp>
 #include <searvins/gnss/observation.hpp>
 #include <searvins/gnss/single_point_solution.hpp>
+#include <searvins/imu/centreline.hpp>
 #include <searvins/imu/imu_sample.hpp>
 #include <searvins/imu/position_fix.hpp>
 #include <searvins/vision/camera_correction.hpp>
@@ -133,6 +134,7 @@ struct RunOptions {
   std::optional<estimator::StereoInertialOptions> inertial;
   bool robust{true};          ///< false: every observation of code, phase and Doppler has weight one
   bool batch_by_size{false};  ///< the batch form looks at |e|^2 / m instead of |e|^2
+  imu::Centrelines lanes{};      ///< map for an inertial estimator, in memory that outlives the run
   bool calibrate_camera{false};  ///< estimates time offset and boresight of the camera; with kCalibratingFormulation and an inertial unit
 };
 

@@ -11,6 +11,7 @@
 
 #include "examples/precomputed_frontend/track_reader.hpp"
 #include "examples/searvins/frame_source.hpp"
+#include "examples/support/counts.hpp"
 
 namespace searvins::examples {
 
@@ -38,8 +39,8 @@ class TrackFrames final : public FrameSource {
     if (const io::FileResult<bool> read = advance(); !read) return read.error();
     return true;
   }
-  [[nodiscard]] std::vector<std::pair<std::string, long>> left_out() const override {
-    std::vector<std::pair<std::string, long>> items;
+  [[nodiscard]] std::vector<Count> left_out() const override {
+    std::vector<Count> items;
     for (const io::SkippedItem& item : reader_.skipped().items()) items.emplace_back("tracks: " + item.reason, static_cast<long>(item.count));
     return items;
   }

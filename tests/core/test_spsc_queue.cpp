@@ -15,7 +15,7 @@ using namespace searvins::test;
 namespace {
 
 template <std::size_t N>
-void live_together(Rng& rng) {
+void queued_live_together(Rng& rng) {
   SpscQueue<int, N> queue;
   std::deque<int> model;
   CHECK(queue.capacity() == N);
@@ -65,10 +65,10 @@ std::uint64_t mixed(std::uint64_t x) { return (x ^ (x >> 13U)) * 0x9E3779B97F4A7
 
 TEST_CASE("a queue of one thread: like a deque through random operations, with room for one, two, or many") {
   for_all_seeds(20, [](Rng& rng) {
-    live_together<1>(rng);
-    live_together<2>(rng);
-    live_together<7>(rng);
-    live_together<64>(rng);
+    queued_live_together<1>(rng);
+    queued_live_together<2>(rng);
+    queued_live_together<7>(rng);
+    queued_live_together<64>(rng);
   });
 }
 

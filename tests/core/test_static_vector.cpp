@@ -16,22 +16,22 @@ using searvins::test::Rng;
 
 namespace {
 
-constexpr std::size_t kCapacity = 7;
-using Vector = StaticVector<int, kCapacity>;
+constexpr std::size_t kVectorCapacity = 7;
+using Vector = StaticVector<int, kVectorCapacity>;
 
 void check_same(const Vector& vector, const std::vector<int>& model) {
   REQUIRE(vector.size() == model.size());
   CHECK(std::equal(vector.begin(), vector.end(), model.begin()));
   CHECK(vector.empty() == model.empty());
-  CHECK(vector.full() == (model.size() == kCapacity));
-  for (std::size_t i = vector.size(); i < kCapacity; ++i) CHECK(vector.data()[i] == 0);  // past the end: default values
+  CHECK(vector.full() == (model.size() == kVectorCapacity));
+  for (std::size_t i = vector.size(); i < kVectorCapacity; ++i) CHECK(vector.data()[i] == 0);  // past the end: default values
 }
 
 /// One random operation on both; whatever the vector refuses must leave it as it was.
 void random_step(Rng& rng, Vector& vector, std::vector<int>& model) {
   const int value = integer(rng, 1, 1000);
-  const auto place = static_cast<std::size_t>(integer(rng, 0, kCapacity + 1));
-  const bool fits = model.size() < kCapacity;
+  const auto place = static_cast<std::size_t>(integer(rng, 0, kVectorCapacity + 1));
+  const bool fits = model.size() < kVectorCapacity;
   switch (integer(rng, 0, 7)) {
     case 0:
       CHECK(vector.push_back(value) == fits);
@@ -65,8 +65,8 @@ void random_step(Rng& rng, Vector& vector, std::vector<int>& model) {
       break;
     }
     case 6:
-      CHECK(vector.resize(place) == (place <= kCapacity));
-      if (place <= kCapacity) model.resize(place);
+      CHECK(vector.resize(place) == (place <= kVectorCapacity));
+      if (place <= kVectorCapacity) model.resize(place);
       break;
     default:
       if (integer(rng, 0, 9) == 0) {
@@ -99,7 +99,7 @@ TEST_CASE("StaticVector: an element of the vector itself may be inserted or appe
   searvins::test::for_all_seeds(200, [](Rng& rng) {
     Vector vector;
     std::vector<int> model;
-    const int count = integer(rng, 1, kCapacity - 2);
+    const int count = integer(rng, 1, kVectorCapacity - 2);
     for (int i = 0; i < count; ++i) {
       vector.push_back(i + 1);
       model.push_back(i + 1);
@@ -125,7 +125,7 @@ TEST_CASE("StaticVector: same content, same bytes, whatever the history") {
   roundabout.erase(0);
   roundabout.erase(3);
   REQUIRE(roundabout.size() == direct.size());
-  for (std::size_t i = 0; i < kCapacity; ++i) CHECK(direct.data()[i] == roundabout.data()[i]);
+  for (std::size_t i = 0; i < kVectorCapacity; ++i) CHECK(direct.data()[i] == roundabout.data()[i]);
 }
 
 TEST_CASE("StaticVector: usable at compile time, trivially copyable when its element is") {
@@ -140,5 +140,5 @@ TEST_CASE("StaticVector: usable at compile time, trivially copyable when its ele
     return total;
   }();
   static_assert(sum == 0 + 2 + 3);
-  CHECK(Vector::capacity() == kCapacity);
+  CHECK(Vector::capacity() == kVectorCapacity);
 }

@@ -44,6 +44,7 @@ struct InertialDrive {
   std::function<std::optional<DriveTruth>(GpsTime)> truth{};
   std::vector<vision::StereoFrame<128>> frames{};  ///< only where they were asked for
   vision::StereoCamera<double> camera{};
+  std::vector<imu::CentrelinePoint> lanes{};  ///< the map that the estimator is given; empty: none
 
   [[nodiscard]] double seconds(GpsTime t) const { return seconds_between(start, t); }
 };
@@ -88,6 +89,7 @@ inline InertialUnderTest estimator_for(const InertialDrive& d, const estimator::
   for (const gnss::Ephemeris& record : d.ephemerides) REQUIRE(e.add_ephemeris(record).ok());
   if (d.ionosphere.present()) e.set_ionosphere(d.ionosphere);
   REQUIRE(e.set_base_position(d.base_e_m).ok());
+  e.set_centrelines(d.lanes);
   return e;
 }
 
@@ -170,6 +172,24 @@ inline Run run_all(InertialUnderTest& e, const InertialDrive& d, const std::vect
 inline Run run_all(const InertialDrive& d, const std::vector<Arrival>& all, const estimator::EstimatorOptions& options) {
   InertialUnderTest e = estimator_for(d, options);
   return run_all(e, d, all);
+}
+
+/// The way of the antenna as one lane: a point a rover epoch, `right_m` to the right of it, lines numbered from `first_line` on (a new one after a stop).
+inline std::vector<imu::CentrelinePoint> lane_of(const InertialDrive& d, double right_m = 0, std::uint32_t first_line = 1) {
+  std::vector<imu::CentrelinePoint> points;
+  std::uint32_t line = first_line;
+  for (std::size_t k = 1; k < d.rover.size(); ++k) {
+    const auto now = d.truth(d.rover[k - 1].tag), next = d.truth(d.rover[k].tag);
+    if (!now || !next) continue;
+    const Eigen::Vector3d way_m = next->antenna_e_m - now->antenna_e_m;
+    if (way_m.norm() < 1) {
+      ++line;
+      continue;
+    }
+    const Eigen::Vector3d up_e = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(now->antenna_e_m)).col(2);
+    points.push_back({now->antenna_e_m + right_m * way_m.cross(up_e).normalized(), line});
+  }
+  return points;
 }
 
 /// Error of a solution, East-North-Up metres; nothing where the truth says nothing.

@@ -22,6 +22,7 @@ Status InertialUnderTest::set_base_position(const Eigen::Vector3d& position_e_m)
   return impl_->estimator.set_base_position(position_e_m);
 }
 Status InertialUnderTest::set_heading(double heading_rad, double sigma_rad) { return impl_->estimator.set_heading(heading_rad, sigma_rad); }
+void InertialUnderTest::set_centrelines(imu::Centrelines lines) { impl_->estimator.set_centrelines(lines); }
 Status InertialUnderTest::add_imu(const imu::ImuSample& sample) { return impl_->estimator.add_imu(sample); }
 Status InertialUnderTest::add_base(const gnss::ObservationEpoch& epoch) { return impl_->estimator.add_base(epoch); }
 Status InertialUnderTest::add_rover(const gnss::ObservationEpoch& epoch) { return impl_->estimator.add_rover(epoch); }

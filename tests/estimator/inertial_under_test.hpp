@@ -29,6 +29,7 @@ class InertialUnderTest {
   void set_ionosphere(const gnss::KlobucharCoefficients& k);
   Status set_base_position(const Eigen::Vector3d& position_e_m);
   Status set_heading(double heading_rad, double sigma_rad);
+  void set_centrelines(imu::Centrelines lines);
   Status add_imu(const imu::ImuSample& sample);
   Status add_base(const gnss::ObservationEpoch& epoch);
   Status add_rover(const gnss::ObservationEpoch& epoch);

@@ -33,7 +33,8 @@ inline std::vector<double> numbers_of(const estimator::RtkSolution& s) {
                         static_cast<double>(s.iterations),
                         static_cast<double>(s.restarted),
                         static_cast<double>(s.has_attitude),
-                        static_cast<double>(s.stationary)};
+                        static_cast<double>(s.stationary),
+                        static_cast<double>(s.in_lane)};
   for (int i = 0; i < 3; ++i) {
     v.insert(v.end(), {s.position_e_m[i], s.velocity_e_mps[i], s.attitude_sigma_rad[i], s.accel_bias_b_mps2[i], s.gyro_bias_b_radps[i]});
     for (int j = 0; j < 3; ++j) v.insert(v.end(), {s.covariance_enu_m2(i, j), s.velocity_covariance_enu(i, j), s.R_nb(i, j)});

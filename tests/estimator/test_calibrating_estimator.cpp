@@ -3,10 +3,10 @@
 // believes the calibration, and that one that does not finds both and is as good as with the camera it was told of.
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 
 #include "estimator/inertial_drive.hpp"
 #include "estimator/stereo_under_test.hpp"
+#include "examples/support/angle_units.hpp"
 
 using namespace searvins;
 using namespace searvins::test;
@@ -16,11 +16,11 @@ using estimator::SolutionSource;
 namespace {
 
 constexpr double kFrom = 68, kTo = 98, kEnd = 100;  ///< without a rover
-constexpr double kDeg = 180 / std::numbers::pi;
+using searvins::examples::kDegPerRad;
 constexpr double kOffsetS = 5e-3;
 
 /// 0.3 degrees.
-Eigen::Vector3d boresight_rad() { return Eigen::Vector3d{0.2, -0.2, 0.1} / kDeg; }
+Eigen::Vector3d boresight_rad() { return Eigen::Vector3d{0.2, -0.2, 0.1} / kDegPerRad; }
 
 InertialDrive drive_with(double offset_s, const Eigen::Vector3d& turn_rad) {
   return simulated_inertial_drive("light", kEnd, 21, {1, 100, imu::SampleKind::instantaneous, true, offset_s, turn_rad});
@@ -95,10 +95,11 @@ TEST_CASE("a camera 5 ms and 0.3 degrees off: believed, it spoils the solution; 
   const Eigen::Vector3d off_rad = so3::log(Eigen::Matrix3d{c.value.R_nc.transpose() * so3::exp(boresight_rad())});
   char line[240];
   std::snprintf(line, sizeof line, "time offset %.2f +- %.2f ms; boresight off by %.3f, %.3f, %.3f +- %.3f, %.3f, %.3f deg", 1e3 * c.value.time_offset_s, 1e3 * sigma[0],
-                kDeg * off_rad[0], kDeg * off_rad[1], kDeg * off_rad[2], kDeg * sigma[1], kDeg * sigma[2], kDeg * sigma[3]);
+                kDegPerRad * off_rad[0], kDegPerRad * off_rad[1], kDegPerRad * off_rad[2],
+                kDegPerRad * sigma[1], kDegPerRad * sigma[2], kDegPerRad * sigma[3]);
   MESSAGE(line);
   CHECK(std::abs(c.value.time_offset_s - kOffsetS) < 1e-3);
-  CHECK(off_rad.cwiseAbs().maxCoeff() < 0.05 / kDeg);
+  CHECK(off_rad.cwiseAbs().maxCoeff() < 0.05 / kDegPerRad);
   CHECK(std::abs(c.value.time_offset_s - kOffsetS) < 3 * sigma[0]);
   for (int i = 0; i < 3; ++i) CHECK(std::abs(off_rad[i]) < 3 * sigma[1 + i]);
 

@@ -10,6 +10,7 @@
 #include <searvins/math/so3.hpp>
 
 #include "estimator/inertial_drive.hpp"
+#include "examples/support/angle_units.hpp"
 #include "gnss/recordings.hpp"
 #include "stationary/imu_recording.hpp"
 #include "support/shared_data.hpp"
@@ -31,7 +32,7 @@ struct MotionKnot {
 
 /// Columns: time, cycle, week, sow, ECEF position, ECEF velocity, roll, pitch, yaw in degrees (north-east-down). Body axes come out right, forward, up.
 std::vector<MotionKnot> read_motion(const std::filesystem::path& path) {
-  constexpr double kRad = std::numbers::pi / 180;
+  using searvins::examples::kRadPerDeg;
   std::vector<MotionKnot> knots;
   std::ifstream file{path};
   std::string line;
@@ -47,7 +48,8 @@ std::vector<MotionKnot> read_motion(const std::filesystem::path& path) {
     MotionKnot& k = knots.emplace_back();
     k.time = GpsTime::from_week_sow(static_cast<std::int64_t>(v[1]) * 1024 + static_cast<std::int64_t>(v[2]), v[3]);
     k.p_e_m = {v[4], v[5], v[6]}, k.v_e_mps = {v[7], v[8], v[9]};
-    k.R_eb = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(k.p_e_m)) * imu::R_wb_from({v[10] * kRad, v[11] * kRad, v[12] * kRad});
+    k.R_eb = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(k.p_e_m)) *
+             imu::R_wb_from({v[10] * kRadPerDeg, v[11] * kRadPerDeg, v[12] * kRadPerDeg});
   }
   return knots;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // P12 every settings field of the inertial estimator changes some output of a drive that has something for each of them; and none of its steps allocates.
+#include <algorithm>
 #include <atomic>
 #include <vector>
 
@@ -121,6 +122,18 @@ const Flip kAnchors[] = {
     {"inertial.anchor_floor_m", [](EstimatorOptions& o) { o.inertial.anchor_floor_m = 1; }},
 };
 
+const Flip kPredictedMotion[] = {
+    {"rtk.differencing.slips.predicted_motion", [](EstimatorOptions& o) { o.rtk.differencing.slips.predicted_motion = true; }}};
+const Flip kLanes[] = {
+    {"inertial.lane_way_m", [](EstimatorOptions& o) { o.inertial.lane_way_m = 10; }},
+    {"inertial.lanes.sigma_m", [](EstimatorOptions& o) { o.inertial.lanes.sigma_m = 2; }},
+    {"inertial.lanes.gate_sigmas", [](EstimatorOptions& o) { o.inertial.lanes.gate_sigmas = 0.01; }},
+    {"inertial.lanes.max_direction_rad", [](EstimatorOptions& o) { o.inertial.lanes.max_direction_rad = 1e-3; }},
+    {"inertial.lanes.both_ways", [](EstimatorOptions& o) { o.inertial.lanes.both_ways = false; }},
+    {"inertial.lanes.min_speed_mps", [](EstimatorOptions& o) { o.inertial.lanes.min_speed_mps = 9; }},
+    {"inertial.lanes.max_bend_m", [](EstimatorOptions& o) { o.inertial.lanes.max_bend_m = 1e-3; }},
+};
+
 template <std::size_t N>
 void check_flips(const Eventful& e, const EstimatorOptions& reference, const Flip (&flips)[N]) {
   const std::vector<double> before = e.outputs(reference);
@@ -158,6 +171,16 @@ TEST_CASE("P12 every settings field of the inertial estimator changes some outpu
   EstimatorOptions floating = options;  // integers would make the anchor needless
   floating.rtk.resolution.mode = ambiguity::ResolutionMode::off;
   check_flips(e, floating, kAnchors);
+  Eventful few;  // four satellites of one frequency, and no Doppler shift to tell how they moved
+  for (gnss::ObservationEpoch& epoch : few.drive.rover)
+    if (few.drive.seconds(epoch.tag) > 46 && few.drive.seconds(epoch.tag) < 60) epoch.satellites.resize(std::min<std::size_t>(epoch.satellites.size(), 4));
+  EstimatorOptions blind = options;
+  blind.rtk.differencing.slips.doppler = false;
+  check_flips(few, blind, kPredictedMotion);
+  Eventful on_map;
+  on_map.drive.lanes = lane_of(on_map.drive);
+  std::reverse(on_map.drive.lanes.begin(), on_map.drive.lanes.end());  // against the traffic
+  check_flips(on_map, floating, kLanes);
 }
 
 TEST_CASE("a minute of readings and epochs, GNSS alone, aligned, bridged and aligned anew, without one heap allocation") {

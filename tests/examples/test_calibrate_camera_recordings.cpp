@@ -18,10 +18,10 @@ namespace {
 using namespace searvins;
 using namespace searvins::test;
 
-struct Fixture {
+struct CalibrationFixture {
   std::filesystem::path folder{std::filesystem::temp_directory_path() / "searvins_test_calibrate"};
   std::string data{(folder / "drive/").string()};
-  ~Fixture() { std::filesystem::remove_all(folder); }
+  ~CalibrationFixture() { std::filesystem::remove_all(folder); }
   [[nodiscard]] std::string solve() const {
     return "solve --rover " + data + "rover.obs --base " + data + "base.obs --nav " + data + "nav.rnx --imu " + data + "imu.csv --rig " + data + "rig.json --out " +
            (folder / "out").string() + ' ';
@@ -36,7 +36,7 @@ double number(const examples::Json& object, const char* name) {
 
 }  // namespace
 
-TEST_CASE_FIXTURE(Fixture, "solve --calibrate-camera: time offset and boresight are found, printed with sigmas and written to summary.json") {
+TEST_CASE_FIXTURE(CalibrationFixture, "solve --calibrate-camera: time offset and boresight are found, printed with sigmas and written to summary.json") {
   const Outcome made = run("simulate --duration 70 --profile light --seed 21 --camera-offset-ms 5 --camera-boresight-deg 0.2,-0.2,0.1 --out " + data);
   REQUIRE_MESSAGE(made.exit_code == 0, made.output);
   const Outcome outcome = run(solve() + "--calibrate-camera --tracks " + data + "stereo_tracks.csv --truth " + data + "truth.csv");
@@ -59,7 +59,7 @@ TEST_CASE_FIXTURE(Fixture, "solve --calibrate-camera: time offset and boresight 
   for (std::size_t i = 0; i < 3; ++i) CHECK(std::abs(turn->elements[i].number - wanted[i]) < 0.1);
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve --calibrate-camera and simulate: usage errors exit with 2 and say what is needed") {
+TEST_CASE_FIXTURE(CalibrationFixture, "solve --calibrate-camera and simulate: usage errors exit with 2 and say what is needed") {
   CHECK(has(run(solve() + "--calibrate-camera"), "--calibrate-camera needs --tracks FILE or --images DIR"));
   const Outcome other = run(solve() + "--calibrate-camera --robust latent --tracks x");
   CHECK(other.exit_code == 2);

@@ -19,9 +19,9 @@ using namespace searvins;
 using namespace searvins::test;
 
 /// A folder with a run of ten epochs and its truth.
-struct Fixture {
+struct CommandFixture {
   std::filesystem::path folder{std::filesystem::temp_directory_path() / "searvins_test_command"};
-  Fixture() {
+  CommandFixture() {
     std::filesystem::create_directories(folder);
     std::vector<io::TrajectoryRow> rows;
     std::string truth = "week,sow,x,y,z\n";
@@ -37,9 +37,9 @@ struct Fixture {
     REQUIRE(io::write_text_file(path("truth.csv"), truth).empty());
     REQUIRE(io::write_text_file(path("broken.csv"), io::trajectory_header() + "\n1,2,3\n").empty());
   }
-  ~Fixture() { std::filesystem::remove_all(folder); }
-  Fixture(const Fixture&) = delete;
-  Fixture& operator=(const Fixture&) = delete;
+  ~CommandFixture() { std::filesystem::remove_all(folder); }
+  CommandFixture(const CommandFixture&) = delete;
+  CommandFixture& operator=(const CommandFixture&) = delete;
   [[nodiscard]] std::string path(const char* name) const { return (folder / name).string(); }
 };
 
@@ -67,7 +67,7 @@ TEST_CASE("command: usage errors exit with 2 and suggest") {
   CHECK(run("info").exit_code == 2);
 }
 
-TEST_CASE_FIXTURE(Fixture, "command: evaluate prints the tables, and refuses what it cannot use with 3") {
+TEST_CASE_FIXTURE(CommandFixture, "command: evaluate prints the tables, and refuses what it cannot use with 3") {
   const Outcome good = run("evaluate --truth " + path("truth.csv") + " " + folder.string() + " " + path("trajectory.csv"));
   CHECK(good.exit_code == 0);
   CHECK(has(good, "fix rate %"));
@@ -81,7 +81,7 @@ TEST_CASE_FIXTURE(Fixture, "command: evaluate prints the tables, and refuses wha
   CHECK(has(elsewhere, "no truth row lies on a multiple"));
 }
 
-TEST_CASE_FIXTURE(Fixture, "command: info exits with 3 when one of the files is unusable, JSON stays JSON") {
+TEST_CASE_FIXTURE(CommandFixture, "command: info exits with 3 when one of the files is unusable, JSON stays JSON") {
   CHECK(run("info " + path("trajectory.csv")).exit_code == 0);
   const Outcome json = run("info --json " + path("trajectory.csv") + " " + path("none"));
   CHECK(json.exit_code == 3);

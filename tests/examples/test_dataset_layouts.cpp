@@ -15,7 +15,6 @@
 #include <filesystem>
 #include <functional>
 #include <initializer_list>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -29,6 +28,7 @@
 #include "command_runner.hpp"
 #include "examples/datasets/dataset_inputs.hpp"
 #include "examples/datasets/sensor_yaml.hpp"
+#include "examples/support/angle_units.hpp"
 #include "simulated_files.hpp"
 
 using namespace searvins;
@@ -38,18 +38,18 @@ namespace sim = searvins::simulator;
 
 namespace {
 
-constexpr double kDeg = 180 / std::numbers::pi;
+using searvins::examples::kDegPerRad;
 
 /// A folder that goes with the test.
-class Folder {
+class LayoutFolder {
  public:
-  explicit Folder(const std::string& name) : path_(fs::temp_directory_path() / ("searvins_layout_" + name)) {
+  explicit LayoutFolder(const std::string& name) : path_(fs::temp_directory_path() / ("searvins_layout_" + name)) {
     fs::remove_all(path_);
     fs::create_directories(path_);
   }
-  ~Folder() { fs::remove_all(path_); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
+  ~LayoutFolder() { fs::remove_all(path_); }
+  LayoutFolder(const LayoutFolder&) = delete;
+  LayoutFolder& operator=(const LayoutFolder&) = delete;
   [[nodiscard]] const fs::path& path() const { return path_; }
   void write(const std::string& name, const std::string& text) const {
     fs::create_directories((path_ / name).parent_path());
@@ -88,7 +88,7 @@ const sim::Dataset& published_files() {
   return set;
 }
 
-void fill(const Folder& folder, const sim::Dataset& set, bool with_rig = true) {
+void fill(const LayoutFolder& folder, const sim::Dataset& set, bool with_rig = true) {
   for (const sim::DatasetFile& file : set.files)
     if (with_rig || file.name != "rig.json") folder.write(file.name, file.text);
 }
@@ -130,7 +130,7 @@ std::string all_notes(const DatasetRecording& r) {
 }
 
 /// A folder that must be refused: the message, file and hint in one text.
-std::string refusal(const std::string& layout, const Folder& folder, const DatasetChoice& choice = {}) {
+std::string refusal(const std::string& layout, const LayoutFolder& folder, const DatasetChoice& choice = {}) {
   const auto read = read_dataset(layout, folder.path(), choice);
   REQUIRE_FALSE(read.ok());
   CHECK_MESSAGE(!read.error().hint.empty(), read.error().message);
@@ -152,7 +152,7 @@ std::vector<imu::ImuSample> body_readings(const std::string& path, const Rig& ri
 
 /// The readings and the antenna as the plain layout tells them.
 struct PlainDrive {
-  Folder folder{"plain"};
+  LayoutFolder folder{"plain"};
   std::vector<imu::ImuSample> readings;
   TruthTrack truth;
   Rig rig;
@@ -278,7 +278,7 @@ TEST_CASE("dataset rigs: TEX-CUP's two calibrations of the pair agree with each 
   const Eigen::Matrix3d apart =
       rig.camera->R_b_c.transpose() * pair->camera().R_bc;  // both have x along the baseline; only the turn about it is a choice
   CHECK(std::abs(apart(0, 0) - 1) < 1e-8);
-  CHECK(Eigen::AngleAxisd(apart).angle() * kDeg < 0.1);
+  CHECK(Eigen::AngleAxisd(apart).angle() * kDegPerRad < 0.1);
   CHECK((pair->camera().p_bc_m - rig.camera->t_b_c_m).norm() < 1e-12);
 }
 
@@ -290,7 +290,7 @@ TEST_CASE("dataset times: the scored window of TEX-CUP is 4040 seconds of 2019-0
 
 TEST_CASE("texcup: a simulated set is read as the drive it is: readings in body axes, antenna, base, tracks") {
   const PlainDrive plain;
-  const Folder folder("texcup");
+  const LayoutFolder folder("texcup");
   fill(folder, files(sim::Layout::texcup));
   const auto read = read_texcup(folder.path());
   REQUIRE_MESSAGE(read.ok(), io::to_string(read.error()));
@@ -304,7 +304,7 @@ TEST_CASE("texcup: a simulated set is read as the drive it is: readings in body 
   CHECK_FALSE(has_note(*read, "as published"));
   CHECK_MESSAGE(has_note(*read, "rig.json"), all_notes(*read));
 
-  const Folder out("texcup_out");
+  const LayoutFolder out("texcup_out");
   const auto inputs = write_inputs(*read, out.path() / "inputs");
   REQUIRE(inputs.ok());
   CHECK(inputs->rig == (folder.path() / "rig.json").string());
@@ -323,7 +323,7 @@ TEST_CASE("ppc, urbannav: a simulated set is read as the drive it is, through th
   for (const Case& c : {Case{sim::Layout::ppc, "ppc", 121, 1e-3}, Case{sim::Layout::urbannav, "urbannav", 25, 2e-3}}) {
     const std::string& name = c.name;
     INFO(name);
-    const Folder folder(name), out(name + "_out");
+    const LayoutFolder folder(name), out(name + "_out");
     fill(folder, files(c.layout));
     const auto read = read_dataset(name, folder.path());
     REQUIRE_MESSAGE(read.ok(), io::to_string(read.error()));
@@ -345,7 +345,7 @@ TEST_CASE("ppc, urbannav: a simulated set is read as the drive it is, through th
 }
 
 TEST_CASE("texcup: the published day without a rig.json: the published vehicle and window, and every count that differs") {
-  const Folder folder("published");
+  const LayoutFolder folder("published");
   fill(folder, published_files(), false);
   fs::remove(folder.path() / "stereo_tracks.csv");
   for (const char* camera : {"camera_data/cam0", "camera_data/cam1"}) {
@@ -369,7 +369,7 @@ TEST_CASE("texcup: the published day without a rig.json: the published vehicle a
         "pictures: 200 pairs in the scored time, 40372", "2.00 ms apart", "from the published one"})
     CHECK_MESSAGE(has_note(*read, part), part << " in\n" << all_notes(*read));
 
-  const Folder out("published_out");
+  const LayoutFolder out("published_out");
   for (int again = 0; again < 2; ++again) {  // a second run writes over the first
     const auto inputs = write_inputs(*read, out.path() / "inputs");
     REQUIRE_MESSAGE(inputs.ok(), io::to_string(inputs.error()));
@@ -394,7 +394,7 @@ TEST_CASE("texcup: the published day without a rig.json: the published vehicle a
 }
 
 TEST_CASE("texcup: what cannot be used is refused with its file, its line and what to do") {
-  const Folder folder("texcup_spoilt");
+  const LayoutFolder folder("texcup_spoilt");
   const auto fresh = [&] { fill(folder, files(sim::Layout::texcup)); };
   const std::string imu = "lord_imu.log", truth = "ground_truth.log";
 
@@ -452,7 +452,7 @@ TEST_CASE("texcup: what cannot be used is refused with its file, its line and wh
 }
 
 TEST_CASE("ppc: the city and the direction of z are found; what cannot be used is refused") {
-  const Folder folder("ppc_spoilt");
+  const LayoutFolder folder("ppc_spoilt");
   const auto fresh = [&] {
     fill(folder, files(sim::Layout::ppc), false);
     const ppc::City& nagoya = ppc::kCities[0];
@@ -476,7 +476,7 @@ TEST_CASE("ppc: the city and the direction of z are found; what cannot be used i
   const auto down = read_ppc(folder.path());
   REQUIRE_MESSAGE(down.ok(), io::to_string(down.error()));
   CHECK_MESSAGE(has_note(*down, "z is down"), all_notes(*down));
-  const Folder out("ppc_axes");
+  const LayoutFolder out("ppc_axes");
   out.write("up.csv", up->imu_text->text), out.write("down.csv", down->imu_text->text);
   check_same_readings(body_readings((out.path() / "up.csv").string(), up->rig),
                       body_readings((out.path() / "down.csv").string(), down->rig));
@@ -503,7 +503,7 @@ TEST_CASE("ppc: the city and the direction of z are found; what cannot be used i
 }
 
 TEST_CASE("urbannav: files are told apart by what they hold; what cannot be used is refused") {
-  const Folder folder("urbannav_spoilt");
+  const LayoutFolder folder("urbannav_spoilt");
   const auto fresh = [&] { fill(folder, files(sim::Layout::urbannav), false); };
   const std::string imu = "xsense_imu_sim.csv", truth = "UrbanNav_SIM_GT_raw.txt";
   fresh();
@@ -569,10 +569,10 @@ TEST_CASE("urbannav: the attitude of the truth turns forward to the heading and 
 
 #ifdef SEARVINS_COMMAND
 TEST_CASE("solve --dataset: a folder is solved and scored; what is missing is said with the exit code") {
-  const Folder out("run_out");
+  const LayoutFolder out("run_out");
   for (const auto& [layout, name] :
        {std::pair{sim::Layout::texcup, "texcup"}, std::pair{sim::Layout::ppc, "ppc"}, std::pair{sim::Layout::urbannav, "urbannav"}}) {
-    const Folder folder(std::string{"run_"} + name);
+    const LayoutFolder folder(std::string{"run_"} + name);
     fill(folder, files(layout));
     const std::string place = " '" + folder.path().string() + "' --out '" + out.path().string() + "'";
     for (const char* sensors : {"gnss", "imu"}) {

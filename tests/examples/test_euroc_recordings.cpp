@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::int64_t kStart = 1'403'715'273'000'000'000, kPeriod = 50'000'000;
+constexpr std::int64_t kStartNs = 1'403'715'273'000'000'000, kPeriodNs = 50'000'000;
 
 std::string camera_text(double baseline_m, const char* resolution = "[64, 48]") {
   return "%YAML:1.0\n# a comment\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1.0, 0.0, 0.0, " + std::to_string(baseline_m) +
@@ -48,7 +48,7 @@ class SmallRecording {
       write(std::string{camera} + "/sensor.yaml", camera_text(is_right ? 0.11 : 0));
       std::string list = "#timestamp [ns],filename\n";
       for (int k = 0; k < frames; ++k) {
-        const std::string stamp = std::to_string(kStart + k * kPeriod + (is_right ? right_late_ns : 0));
+        const std::string stamp = std::to_string(kStartNs + k * kPeriodNs + (is_right ? right_late_ns : 0));
         list += stamp + ',' + stamp + ".png\r\n";
         REQUIRE(write_png((root_ / "mav0" / camera / "data" / (stamp + ".png")).string(), GrayImage(64, 48, static_cast<std::uint8_t>(k)))
                     .empty());
@@ -66,7 +66,7 @@ class SmallRecording {
   [[nodiscard]] const fs::path& root() const { return root_; }
   [[nodiscard]] fs::path file(const std::string& name) const { return root_ / "mav0" / name; }
   [[nodiscard]] fs::path image(const char* camera, int k) const {
-    return file(std::string{camera} + "/data/" + std::to_string(kStart + k * kPeriod) + ".png");
+    return file(std::string{camera} + "/data/" + std::to_string(kStartNs + k * kPeriodNs) + ".png");
   }
   void write(const std::string& name, const std::string& text) const {
     fs::create_directories(file(name).parent_path());
@@ -200,7 +200,7 @@ TEST_CASE("EuRoC layout: a whole recording, named by its folder or by mav0") {
     CHECK(read.skipped.total() == 0);
     CHECK(r.imu.samples.empty());
     CHECK(r.truth.empty());
-    CHECK(r.pairs[3].ns == kStart + 3 * kPeriod);
+    CHECK(r.pairs[3].ns == kStartNs + 3 * kPeriodNs);
     CHECK(r.pairs[3].time == to_gps(UtcTime{r.pairs[3].ns}));
     const auto images = read_euroc_pair(r, r.pairs[3]);
     REQUIRE(images.ok());
@@ -208,7 +208,7 @@ TEST_CASE("EuRoC layout: a whole recording, named by its folder or by mav0") {
     CHECK(images->right(5, 5) == 3);
     EurocOptions gps;
     gps.nanoseconds = io::NanosecondScale::gps;
-    CHECK(read_euroc(folder, gps).value.pairs[3].time.ns == kStart + 3 * kPeriod);
+    CHECK(read_euroc(folder, gps).value.pairs[3].time.ns == kStartNs + 3 * kPeriodNs);
   }
 }
 
@@ -219,7 +219,7 @@ TEST_CASE("EuRoC layout: single images that are missing cost their pair and are 
   small.write("cam1/data.csv", [&] {
     std::string list = "#timestamp [ns],filename\nnonsense\n";
     for (const int k : {0, 1, 2, 4, 3, 5, 6, 7, 8, 9})
-      list += std::to_string(kStart + k * kPeriod) + ',' + std::to_string(kStart + k * kPeriod) + ".png\n";
+      list += std::to_string(kStartNs + k * kPeriodNs) + ',' + std::to_string(kStartNs + k * kPeriodNs) + ".png\n";
     return list;
   }());
   const auto read = read_euroc(small.root());
@@ -239,7 +239,7 @@ TEST_CASE("EuRoC layout: small differences of the stamps are nothing, half a per
   const auto good = read_euroc(near.root());
   REQUIRE(good.ok());
   CHECK(good.value.pairs.size() == 10);
-  const SmallRecording half("half", 10, kPeriod / 2);
+  const SmallRecording half("half", 10, kPeriodNs / 2);
   check_refused(read_euroc(half.root()), {"only 0 of 10 left images", "cam1 is 25.0 ms away from cam0", "period is 50.0 ms"});
   EurocOptions loose;
   loose.pair_tolerance_share = 0.51;
@@ -288,8 +288,8 @@ TEST_CASE("EuRoC layout: no right camera, no images, one place for both cameras,
 TEST_CASE("EuRoC truth: rows that cannot be used are counted; none at all is an error") {
   const std::string row = ",1,2,3,0.5,0.5,0.5,0.5,4,5,6,0,0,0,0,0,0\n";
   const auto truth =
-      parse_euroc_truth("#timestamp\n" + std::to_string(kStart) + row + std::to_string(kStart) + row + "x" + row +
-                            std::to_string(kStart + 1) + ",1,2,3,0.5,0.5,0.5,0.9\n" + std::to_string(kStart + 2) + ",1,2,3,1,0,0,0\n",
+      parse_euroc_truth("#timestamp\n" + std::to_string(kStartNs) + row + std::to_string(kStartNs) + row + "x" + row +
+                            std::to_string(kStartNs + 1) + ",1,2,3,0.5,0.5,0.5,0.9\n" + std::to_string(kStartNs + 2) + ",1,2,3,1,0,0,0\n",
                         "gt.csv");
   REQUIRE(truth.ok());
   REQUIRE(truth.value.size() == 2);

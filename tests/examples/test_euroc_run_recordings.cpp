@@ -27,18 +27,18 @@ namespace fs = std::filesystem;
 namespace {
 
 /// A folder of its own for a test, away again at its end.
-class Folder {
+class RunFolder {
  public:
-  explicit Folder(const char* name) : path_(fs::temp_directory_path() / name) {
+  explicit RunFolder(const char* name) : path_(fs::temp_directory_path() / name) {
     fs::remove_all(path_);
     fs::create_directories(path_);
   }
-  ~Folder() {
+  ~RunFolder() {
     std::error_code failed;
     fs::remove_all(path_, failed);
   }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
+  RunFolder(const RunFolder&) = delete;
+  RunFolder& operator=(const RunFolder&) = delete;
   [[nodiscard]] const fs::path& path() const { return path_; }
 
  private:
@@ -101,7 +101,7 @@ TEST_CASE("euroc run: real pictures of a craft at rest: a pose for each frame fr
     return;
   }
   const fs::path recording = *shared / "data/real/euroc_v101_static";
-  const Folder out("searvins_euroc_rest");
+  const RunFolder out("searvins_euroc_rest");
   const Outcome run = test::run("solve --dataset euroc '" + recording.string() + "' --out '" + out.path().string() + "'");
   INFO(run.output);
   REQUIRE(run.exit_code == 0);
@@ -128,7 +128,7 @@ TEST_CASE("euroc run: real pictures of a craft at rest: a pose for each frame fr
 }
 
 TEST_CASE("euroc run: a rendered drive is followed to a per cent of its way, from the first frame on") {
-  const Folder data("searvins_euroc_drive"), out("searvins_euroc_drive_out");
+  const RunFolder data("searvins_euroc_drive"), out("searvins_euroc_drive_out");
   write_route(data.path() / "route.csv", 12);
   const Outcome made = test::run("simulate --profile urban --route '" + (data.path() / "route.csv").string() +
                                  "' --duration 12 --images 480x180 --out '" + data.path().string() + "'");

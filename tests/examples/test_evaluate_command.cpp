@@ -20,9 +20,9 @@ using namespace searvins;
 using namespace searvins::test;
 
 /// A run of sixty epochs that stands still, its truth, and what `solve` leaves beside it: every tenth epoch is a wrong fix.
-struct Fixture {
+struct EvaluationFixture {
   std::filesystem::path folder{std::filesystem::temp_directory_path() / "searvins_test_evaluate"};
-  Fixture() {
+  EvaluationFixture() {
     std::filesystem::create_directories(folder);
     std::vector<io::TrajectoryRow> rows;
     std::vector<double> ratios;
@@ -43,9 +43,9 @@ struct Fixture {
                 .empty());
     REQUIRE(io::write_text_file(path("truth.csv"), truth).empty());
   }
-  ~Fixture() { std::filesystem::remove_all(folder); }
-  Fixture(const Fixture&) = delete;
-  Fixture& operator=(const Fixture&) = delete;
+  ~EvaluationFixture() { std::filesystem::remove_all(folder); }
+  EvaluationFixture(const EvaluationFixture&) = delete;
+  EvaluationFixture& operator=(const EvaluationFixture&) = delete;
   [[nodiscard]] std::string path(const char* name) const { return (folder / name).string(); }
   [[nodiscard]] Outcome evaluate(const std::string& arguments) const {
     return run("evaluate --truth " + path("truth.csv") + ' ' + arguments);
@@ -54,7 +54,7 @@ struct Fixture {
 
 }  // namespace
 
-TEST_CASE_FIXTURE(Fixture, "evaluate: the paper's tables, its rows on demand, names of choice") {
+TEST_CASE_FIXTURE(EvaluationFixture, "evaluate: the paper's tables, its rows on demand, names of choice") {
   const Outcome plain = evaluate(folder.string());
   REQUIRE_MESSAGE(plain.exit_code == 0, plain.output);
   CHECK(has(plain, "TC, r+b       S  yes"));
@@ -69,7 +69,7 @@ TEST_CASE_FIXTURE(Fixture, "evaluate: the paper's tables, its rows on demand, na
             "Bounds at a risk of 0.001 an epoch (horizontal 3.72, vertical 3.29 sigma), alert limit 2.50 m"));
 }
 
-TEST_CASE_FIXTURE(Fixture, "evaluate: tables as CSV and Markdown, all figures as JSON, the page with its diagram") {
+TEST_CASE_FIXTURE(EvaluationFixture, "evaluate: tables as CSV and Markdown, all figures as JSON, the page with its diagram") {
   const Outcome outcome = evaluate("--paper --tables " + path("t.csv") + " --tables " + path("t.md") + " --json " + path("e.json") +
                                    " --report " + path("r.html") + ' ' + folder.string());
   REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
@@ -102,7 +102,7 @@ TEST_CASE_FIXTURE(Fixture, "evaluate: tables as CSV and Markdown, all figures as
     CHECK_MESSAGE(html.find(outside) == std::string::npos, outside);
 }
 
-TEST_CASE_FIXTURE(Fixture, "evaluate: usage errors exit with 2, files that cannot be written with 3") {
+TEST_CASE_FIXTURE(EvaluationFixture, "evaluate: usage errors exit with 2, files that cannot be written with 3") {
   CHECK(evaluate("--integrity-risk 0 " + folder.string()).exit_code == 2);
   CHECK(evaluate("--integrity-risk 0.6 " + folder.string()).exit_code == 2);
   CHECK(evaluate("--alert-limit -1 " + folder.string()).exit_code == 2);

@@ -24,7 +24,7 @@ using searvins::test::uniform;
 
 namespace {
 
-const GpsTime kStart = GpsTime::from_week_sow(2323, 553980);
+const GpsTime kDriveStart = GpsTime::from_week_sow(2323, 553980);
 
 /// A straight drive at constant ECEF velocity, one truth row a second, and the same as an estimate.
 struct Drive {
@@ -37,7 +37,7 @@ Drive straight_drive(Rng& rng, int n, SolutionStatus status = SolutionStatus::fi
   const Eigen::Vector3d p0{-3810234.401, 3567867.762, 3652897.917}, v_mps = test::random_vector<3>(rng, 15);
   for (int i = 0; i < n; ++i) {
     TrajectoryRow row;
-    row.time = kStart.plus_seconds(i);
+    row.time = kDriveStart.plus_seconds(i);
     row.p_e_m = p0 + i * v_mps;
     row.status = status;
     drive.truth.points.push_back({row.time, row.p_e_m});

@@ -24,7 +24,7 @@
 
 using namespace searvins;
 using examples::GrayImage;
-using Frontend = orb::OrbFrontend<256>;
+using SmallFrontend = orb::OrbFrontend<256>;
 using vision::CameraMotion;
 
 namespace {
@@ -62,13 +62,13 @@ struct Followed {
 };
 
 /// Drives `frames` frames and compares every observation with the plane.
-Followed follow(const Drive& drive, Frontend& frontend, int frames, bool is_predicted) {
+Followed follow(const Drive& drive, SmallFrontend& frontend, int frames, bool is_predicted) {
   Followed result;
   std::map<std::uint64_t, Eigen::Vector3d> first_point;
   std::map<std::uint64_t, int> length;
   for (int k = 0; k < frames; ++k) {
     const GrayImage left = drive.image(k, false), right = drive.image(k, true);
-    Frontend::Frame frame;
+    SmallFrontend::Frame frame;
     const std::optional<CameraMotion> predicted = is_predicted && k > 0 ? std::optional{drive.step} : std::nullopt;
     REQUIRE(frontend.process(pair_of(left, right), predicted, frame).ok());
     std::set<std::uint64_t> tracks;
@@ -101,7 +101,7 @@ TEST_CASE("Tracks on a textured plane keep their numbers, their places and their
   for (const bool is_predicted : {true, false}) {
     CAPTURE(is_predicted);
     const Drive drive{{test::Texture{77}}};
-    Frontend frontend{drive.camera, small_options()};
+    SmallFrontend frontend{drive.camera, small_options()};
     const Followed f = follow(drive, frontend, 10, is_predicted);
     const double rms_px = std::sqrt(f.disparity_error2 / f.observations);
     MESSAGE("plane, " << std::string(is_predicted ? "predicted" : "not predicted") << ": " << f.observations << " observations, "
@@ -117,10 +117,10 @@ TEST_CASE("Tracks on a textured plane keep their numbers, their places and their
 
 TEST_CASE("A camera at rest: nearly every track goes on; a track number is never used twice") {
   const Drive drive{{test::Texture{5}}};
-  Frontend frontend{drive.camera, small_options()};
+  SmallFrontend frontend{drive.camera, small_options()};
   const GrayImage left = drive.image(0, false), right = drive.image(0, true), black(320, 240);
   std::set<std::uint64_t> before, after;
-  Frontend::Frame frame;
+  SmallFrontend::Frame frame;
   for (int k = 0; k < 4; ++k) {
     frame = {};
     REQUIRE(frontend.process(pair_of(left, right), CameraMotion{}, frame).ok());
@@ -142,8 +142,8 @@ TEST_CASE("A track survives a missed frame and no more than max_missed of them")
   const GrayImage left = drive.image(0, false), right = drive.image(0, true), black(320, 240);
   for (const int missed : {1, 2, 3}) {
     CAPTURE(missed);
-    Frontend frontend{drive.camera, small_options()};
-    Frontend::Frame frame;
+    SmallFrontend frontend{drive.camera, small_options()};
+    SmallFrontend::Frame frame;
     REQUIRE(frontend.process(pair_of(left, right), std::nullopt, frame).ok());
     std::set<std::uint64_t> tracks;
     for (const auto& o : frame.observations) tracks.insert(o.track);
@@ -166,10 +166,10 @@ TEST_CASE("A track survives a missed frame and no more than max_missed of them")
 
 TEST_CASE("The same images give the same bits") {
   const Drive drive{{test::Texture{9}}};
-  Frontend one{drive.camera, small_options()}, two{drive.camera, small_options()};
+  SmallFrontend one{drive.camera, small_options()}, two{drive.camera, small_options()};
   for (int k = 0; k < 3; ++k) {
     const GrayImage left = drive.image(k, false), right = drive.image(k, true);
-    Frontend::Frame a, b;
+    SmallFrontend::Frame a, b;
     REQUIRE(one.process(pair_of(left, right), drive.step, a).ok());
     REQUIRE(two.process(pair_of(left, right), drive.step, b).ok());
     REQUIRE(a.observations.size() == b.observations.size());
@@ -184,8 +184,8 @@ TEST_CASE("The same images give the same bits") {
 TEST_CASE("Missing, unequal and tiny images are refused, counted, and leave the tracks alone") {
   const Drive drive{{test::Texture{10}}};
   const GrayImage left = drive.image(0, false), right = drive.image(0, true), narrow(300, 240), tiny(20, 20);
-  Frontend frontend{drive.camera, small_options()};
-  Frontend::Frame frame;
+  SmallFrontend frontend{drive.camera, small_options()};
+  SmallFrontend::Frame frame;
   REQUIRE(frontend.process(pair_of(left, right), std::nullopt, frame).ok());
   const std::size_t tracks = frontend.tracks().size();
   REQUIRE(tracks > 50);
@@ -207,8 +207,8 @@ TEST_CASE("Missing, unequal and tiny images are refused, counted, and leave the 
 TEST_CASE("Black, white, half white, and a prediction that is not finite: fewer observations, no failure") {
   const Drive drive{{test::Texture{12}}};
   const GrayImage left = drive.image(0, false), right = drive.image(0, true), black(320, 240), white(320, 240, 255);
-  Frontend frontend{drive.camera, small_options()};
-  Frontend::Frame frame;
+  SmallFrontend frontend{drive.camera, small_options()};
+  SmallFrontend::Frame frame;
   for (const GrayImage* image : {&black, &white}) {
     REQUIRE(frontend.process(pair_of(*image, *image), std::nullopt, frame).ok());
     CHECK(frame.observations.empty());
@@ -231,9 +231,9 @@ TEST_CASE("Black, white, half white, and a prediction that is not finite: fewer 
 TEST_CASE("Through CheckedFrontend times and the calibrated size are checked too") {
   const Drive drive{{test::Texture{13}}};
   const GrayImage left = drive.image(0, false), right = drive.image(0, true), black(320, 240);
-  Frontend frontend{drive.camera, small_options()};
+  SmallFrontend frontend{drive.camera, small_options()};
   vision::CheckedFrontend checked{frontend, {320, 240}};
-  Frontend::Frame frame;
+  SmallFrontend::Frame frame;
   vision::ImagePair images = pair_of(left, right);
   REQUIRE(checked.process(images, std::nullopt, frame).ok());
   CHECK(frame.observations.size() > 50);
@@ -257,8 +257,8 @@ TEST_CASE("5000 keypoints: the frame takes what it has room for, the best, and c
   options.extractor.features = 5000;
   options.extractor.levels = 2;
   options.max_tracks = 1500;
-  Frontend frontend{camera, options};
-  Frontend::Frame frame;
+  SmallFrontend frontend{camera, options};
+  SmallFrontend::Frame frame;
   REQUIRE(frontend.process(pair_of(left, right), std::nullopt, frame).ok());
   const orb::FrameStatistics& s = frontend.statistics();
   MESSAGE(s.left_features << " features, " << s.stereo_matched() << " matched, " << s.begun << " tracks, " << frame.dropped
@@ -267,6 +267,6 @@ TEST_CASE("5000 keypoints: the frame takes what it has room for, the best, and c
   CHECK(s.left_features <= 5000);
   CHECK(s.begun == 1500);
   CHECK(s.not_begun == s.stereo_matched() - 1500);
-  CHECK(frame.observations.size() == Frontend::Frame::kCapacity);
+  CHECK(frame.observations.size() == SmallFrontend::Frame::kCapacity);
   CHECK(frame.dropped == s.observations - frame.observations.size());
 }

@@ -21,7 +21,7 @@ using examples::GrayImage;
 
 namespace {
 
-std::string bytes_of(std::string_view hex) {
+std::string from_hex(std::string_view hex) {
   std::string bytes;
   for (std::size_t i = 0; i + 1 < hex.size(); i += 2) {
     const auto digit = [](char c) { return c <= '9' ? c - '0' : c - 'a' + 10; };
@@ -112,7 +112,7 @@ TEST_CASE("PNG: files of another encoder, all five filters: stored blocks, fixed
       "41547801636090b78bad99bd8b5150050c988c2d6c9ddc7d0299cb5dea03f0370000001b49444154dc3dcff805b2941b1bb7191b1b33ac7c2819d879"
       "f027001e9f0e3679242f0c0000000049454e44ae426082";
   for (const std::string_view hex : {kStored, kFixed}) {
-    const std::string file = bytes_of(hex);
+    const std::string file = from_hex(hex);
     const auto read = examples::parse_image(file, "x.png");
     REQUIRE(read.ok());
     REQUIRE(read->width() == 7);

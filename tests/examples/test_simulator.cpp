@@ -8,7 +8,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <utility>
 
@@ -22,13 +21,14 @@
 #include <searvins/io/text_reader.hpp>
 
 #include "examples/simulator/recording.hpp"
+#include "examples/support/angle_units.hpp"
 #include "examples/support/truth.hpp"
 
 using namespace searvins;
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
+using searvins::examples::kRadPerDeg;
 
 std::filesystem::path folder() { return std::filesystem::path{SEARVINS_SOURCE_DIR} / "examples/data/synthetic_drive"; }
 
@@ -188,7 +188,7 @@ TEST_CASE("simulator: double differences at the truth are integers in the open")
           double cycles = 0, elevation = 0;
           if (!signal || !single_difference(b, rover, base, p_e_m, satellite, *signal, cycles, elevation)) continue;
           if (pass == 0 && elevation > pivot_elevation) pivot = cycles, pivot_elevation = elevation;
-          if (pass == 0 || elevation < 20 * kDegree) continue;
+          if (pass == 0 || elevation < 20 * kRadPerDeg) continue;
           worst_cycles = std::max(worst_cycles, std::abs(cycles - pivot - std::round(cycles - pivot)));
           ++compared;
         }
@@ -202,10 +202,10 @@ TEST_CASE("simulator: double differences at the truth are integers in the open")
 
 TEST_CASE("simulator: a street blocks, reflects or lets pass") {
   const simulator::Street street{0, 10, 5, 5};  // along north, walls at 63 degrees to the east and west
-  CHECK(street.path({90 * kDegree, 70 * kDegree}) == simulator::Path::direct);
-  CHECK(street.path({0, 5 * kDegree}) == simulator::Path::direct);
-  CHECK(street.path({90 * kDegree, 50 * kDegree}) == simulator::Path::reflected);
-  CHECK(street.path({90 * kDegree, 20 * kDegree}) == simulator::Path::blocked);
+  CHECK(street.path({90 * kRadPerDeg, 70 * kRadPerDeg}) == simulator::Path::direct);
+  CHECK(street.path({0, 5 * kRadPerDeg}) == simulator::Path::direct);
+  CHECK(street.path({90 * kRadPerDeg, 50 * kRadPerDeg}) == simulator::Path::reflected);
+  CHECK(street.path({90 * kRadPerDeg, 20 * kRadPerDeg}) == simulator::Path::blocked);
   // The mirror image of the antenna behind the western wall lies 10 m to the west: the way from the east is longer by 10 m cos(el).
-  CHECK(street.extra_m({90 * kDegree, 50 * kDegree}) == doctest::Approx(10 * std::cos(50 * kDegree)));
+  CHECK(street.extra_m({90 * kRadPerDeg, 50 * kRadPerDeg}) == doctest::Approx(10 * std::cos(50 * kRadPerDeg)));
 }

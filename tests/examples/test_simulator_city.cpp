@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "examples/simulator/simulation.hpp"
+#include "examples/support/angle_units.hpp"
 #include "support/property.hpp"
 
 using namespace searvins;
@@ -20,7 +21,8 @@ using simulator::Wall;
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180, kFarM = 1e7;
+using searvins::examples::kRadPerDeg;
+constexpr double kFarM = 1e7;
 
 Eigen::Vector3d direction(double azimuth_rad, double elevation_rad) {
   return {std::cos(elevation_rad) * std::sin(azimuth_rad), std::cos(elevation_rad) * std::cos(azimuth_rad), std::sin(elevation_rad)};
@@ -70,16 +72,16 @@ TEST_CASE("simulated city: a wall 5 m to the west sends the signal from the east
   CHECK(city.walls[0].normal.x() == 1);
   const Eigen::Vector3d antenna{0, 0, 2};
   const Surroundings around(city, antenna);
-  const auto seen = around.reflection(direction(90 * kDegree, 40 * kDegree));
+  const auto seen = around.reflection(direction(90 * kRadPerDeg, 40 * kRadPerDeg));
   REQUIRE(seen);
-  CHECK(seen->extra_m == doctest::Approx(10 * std::cos(40 * kDegree)));
+  CHECK(seen->extra_m == doctest::Approx(10 * std::cos(40 * kRadPerDeg)));
   CHECK(seen->point_m.x() == doctest::Approx(-5));
-  CHECK(seen->point_m.z() == doctest::Approx(2 + 5 * std::tan(40 * kDegree)));
-  CHECK(!around.reflection(direction(270 * kDegree, 40 * kDegree)));       // the satellite is behind the wall
-  CHECK(!around.reflection(direction(90 * kDegree, 85 * kDegree)));        // the mirror point would be above the roof
-  CHECK(around.direct(direction(90 * kDegree, 10 * kDegree)).is_clear);    // away from the wall
-  CHECK(!around.direct(direction(270 * kDegree, 75 * kDegree)).is_clear);  // the roof is at 79.9 degrees
-  CHECK(around.direct(direction(270 * kDegree, 81 * kDegree)).is_clear);
+  CHECK(seen->point_m.z() == doctest::Approx(2 + 5 * std::tan(40 * kRadPerDeg)));
+  CHECK(!around.reflection(direction(270 * kRadPerDeg, 40 * kRadPerDeg)));       // the satellite is behind the wall
+  CHECK(!around.reflection(direction(90 * kRadPerDeg, 85 * kRadPerDeg)));        // the mirror point would be above the roof
+  CHECK(around.direct(direction(90 * kRadPerDeg, 10 * kRadPerDeg)).is_clear);    // away from the wall
+  CHECK(!around.direct(direction(270 * kRadPerDeg, 75 * kRadPerDeg)).is_clear);  // the roof is at 79.9 degrees
+  CHECK(around.direct(direction(270 * kRadPerDeg, 81 * kRadPerDeg)).is_clear);
 }
 
 TEST_CASE("simulated city: the extra path of a reflection is the detour over the mirror point") {
@@ -110,7 +112,7 @@ TEST_CASE("simulated city: the detour over a roof is the shortest way over its e
     City city;
     const Eigen::Vector2d a = Eigen::Vector2d{uniform(rng, 5, 25), -100}, b = Eigen::Vector2d{uniform(rng, 5, 25), 100};
     city.walls.push_back(wall_between(b, a, uniform(rng, 8, 40)));
-    const Eigen::Vector3d antenna{0, 0, 2}, u = direction(uniform(rng, 45, 135) * kDegree, uniform(rng, 0.2, 1.2));
+    const Eigen::Vector3d antenna{0, 0, 2}, u = direction(uniform(rng, 45, 135) * kRadPerDeg, uniform(rng, 0.2, 1.2));
     const simulator::DirectRay ray = Surroundings(city, antenna).direct(u);
     if (ray.is_clear) {
       CHECK(ray.detour_m == 0);

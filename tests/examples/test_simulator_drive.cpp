@@ -16,6 +16,7 @@
 #include "examples/simulator/spline_route.hpp"
 #include "examples/simulator/street_route.hpp"
 #include "examples/simulator/vehicle.hpp"
+#include "examples/support/angle_units.hpp"
 #include "support/property.hpp"
 
 using namespace searvins;
@@ -23,10 +24,10 @@ using namespace searvins::test;
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
+using searvins::examples::kRadPerDeg;
 
 geodesy::LocalFrame frame_at(double lat_deg, double lon_deg) {
-  return geodesy::LocalFrame::at(geodesy::ecef_from_geodetic({lat_deg * kDegree, lon_deg * kDegree, 100}));
+  return geodesy::LocalFrame::at(geodesy::ecef_from_geodetic({lat_deg * kRadPerDeg, lon_deg * kRadPerDeg, 100}));
 }
 
 simulator::Vehicle generated(std::uint64_t seed, double duration_s) {

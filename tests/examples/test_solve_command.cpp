@@ -23,15 +23,15 @@ using namespace searvins;
 using namespace searvins::test;
 
 /// A folder for spoilt copies of the bundled recording and for results.
-struct Fixture {
+struct SolveFixture {
   std::filesystem::path folder{std::filesystem::temp_directory_path() / "searvins_test_solve"};
   std::string data{SEARVINS_SOURCE_DIR "/examples/data/synthetic_drive/"};
   std::string rover{data + "rover.obs"}, base{data + "base.obs"}, nav{data + "nav.rnx"}, truth{data + "truth.csv"};
 
-  Fixture() { std::filesystem::create_directories(folder); }
-  ~Fixture() { std::filesystem::remove_all(folder); }
-  Fixture(const Fixture&) = delete;
-  Fixture& operator=(const Fixture&) = delete;
+  SolveFixture() { std::filesystem::create_directories(folder); }
+  ~SolveFixture() { std::filesystem::remove_all(folder); }
+  SolveFixture(const SolveFixture&) = delete;
+  SolveFixture& operator=(const SolveFixture&) = delete;
 
   [[nodiscard]] std::string path(const char* name) const { return (folder / name).string(); }
   /// Solves the first 15 s unless `more` says otherwise.
@@ -51,7 +51,7 @@ struct Fixture {
 
 }  // namespace
 
-TEST_CASE_FIXTURE(Fixture, "solve: the bundled recording gives every file, readable and scored") {
+TEST_CASE_FIXTURE(SolveFixture, "solve: the bundled recording gives every file, readable and scored") {
   const Outcome outcome = solve("--truth " + truth);
   REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
   for (const char* name :
@@ -83,7 +83,7 @@ TEST_CASE_FIXTURE(Fixture, "solve: the bundled recording gives every file, reada
   CHECK(has(outcome, "header of the base file"));
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve: a run is repeated bit by bit, up to its clock") {
+TEST_CASE_FIXTURE(SolveFixture, "solve: a run is repeated bit by bit, up to its clock") {
   const std::string columns = "--end 274830 --robust latent";
   const auto read = [this] {
     auto rows = io::read_trajectory((folder / "out/trajectory.csv").string());
@@ -97,7 +97,7 @@ TEST_CASE_FIXTURE(Fixture, "solve: a run is repeated bit by bit, up to its clock
   CHECK(read() == first);
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve: every formulation, mode and profile runs; float never says fix") {
+TEST_CASE_FIXTURE(SolveFixture, "solve: every formulation, mode and profile runs; float never says fix") {
   for (const char* options : {"--robust batch", "--robust scalar", "--robust latent", "--ambiguity full", "--continuity constant",
                               "--continuity instantaneous", "--handover restart", "--sigma-profile urban", "--sigma-profile geodetic",
                               "--signals G1C,E1C", "--arc 5 --lag 8", "--mask 20 --min-cn0 30"}) {
@@ -111,7 +111,7 @@ TEST_CASE_FIXTURE(Fixture, "solve: every formulation, mode and profile runs; flo
   for (const io::TrajectoryRow& row : *rows) CHECK(row.status == io::SolutionStatus::float_);
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve: without a base it gives single points") {
+TEST_CASE_FIXTURE(SolveFixture, "solve: without a base it gives single points") {
   const Outcome outcome = run("solve --rover " + rover + " --nav " + nav + " --end 274830 --out " + path("out"));
   REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
   const auto rows = io::read_trajectory((folder / "out/trajectory.csv").string());
@@ -120,7 +120,7 @@ TEST_CASE_FIXTURE(Fixture, "solve: without a base it gives single points") {
   for (const io::TrajectoryRow& row : *rows) CHECK(row.status == io::SolutionStatus::spp);
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve: a damaged epoch is skipped and counted, and does not end the run") {
+TEST_CASE_FIXTURE(SolveFixture, "solve: a damaged epoch is skipped and counted, and does not end the run") {
   rover = spoilt(rover, "rover.obs", "> 2025 06 11 04 20  5.0000000  0 ", "> 2025 06 11 04 20  5.0000000  0x");
   const Outcome outcome = solve();
   CHECK_MESSAGE(outcome.exit_code == 0, outcome.output);
@@ -130,7 +130,7 @@ TEST_CASE_FIXTURE(Fixture, "solve: a damaged epoch is skipped and counted, and d
   CHECK(rows->size() == 15);
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve: usage errors exit with 2") {
+TEST_CASE_FIXTURE(SolveFixture, "solve: usage errors exit with 2") {
   CHECK(run("solve --base " + base + " --nav " + nav + " --out " + path("out")).exit_code == 2);
   CHECK(run("solve --rover " + rover + " --base " + base + " --out " + path("out")).exit_code == 2);
   CHECK(solve("--robust latnet").exit_code == 2);
@@ -143,7 +143,7 @@ TEST_CASE_FIXTURE(Fixture, "solve: usage errors exit with 2") {
   CHECK(has(solve("--imu x --rig y --images x --tracks z"), "give either --tracks FILE or --images DIR"));
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve: unusable files exit with 3, name the file and say what to do") {
+TEST_CASE_FIXTURE(SolveFixture, "solve: unusable files exit with 3, name the file and say what to do") {
   const auto refused = [](const Outcome& outcome, const std::string& file, const std::string& part) {
     CHECK_MESSAGE(outcome.exit_code == 3, outcome.output);
     CHECK_MESSAGE(has(outcome, file), outcome.output);
@@ -197,7 +197,7 @@ TEST_CASE_FIXTURE(Fixture, "solve: unusable files exit with 3, name the file and
   SUBCASE("a rig that is none") { refused(solve("--rig " + truth), "truth.csv", ":1"); }
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve: epochs without differences fall back to single points, and the summary says why") {
+TEST_CASE_FIXTURE(SolveFixture, "solve: epochs without differences fall back to single points, and the summary says why") {
   const Outcome outcome = solve("--end 274815 --mask 85");
   CHECK_MESSAGE(outcome.exit_code == 0, outcome.output);
   CHECK(has(outcome, "16 times no differences: too few satellites in common with the base"));
@@ -206,7 +206,7 @@ TEST_CASE_FIXTURE(Fixture, "solve: epochs without differences fall back to singl
   for (const io::TrajectoryRow& row : *rows) CHECK(row.status == io::SolutionStatus::spp);
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve: a run without any solution exits with 4 and says why") {
+TEST_CASE_FIXTURE(SolveFixture, "solve: a run without any solution exits with 4 and says why") {
   rover = spoilt(rover, "rover.obs", "C1C L1C D1C S1C C2W L2W D2W S2W", "S1X S1C D1C D1X S2X S2W D2W D2X");
   rover = spoilt(rover, "rover2.obs", "C1C L1C D1C S1C C7Q L7Q D7Q S7Q", "S1X S1C D1C D1X S7X S7Q D7Q D7X");
   rover = spoilt(rover, "rover3.obs", "C2I L2I D2I S2I", "S2X S2I D2I D2X");
@@ -215,7 +215,7 @@ TEST_CASE_FIXTURE(Fixture, "solve: a run without any solution exits with 4 and s
   CHECK(has(without_code, "without a solution"));
 }
 
-TEST_CASE_FIXTURE(Fixture, "demo: solves the bundled recording, prints the tables and says where the report is") {
+TEST_CASE_FIXTURE(SolveFixture, "demo: solves the bundled recording, prints the tables and says where the report is") {
   const Outcome outcome = run("demo --out " + path("demo"));
   REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
   for (const char* part : {"scalar", "latent", "symmetric", "fix rate %", "report.html"}) CHECK_MESSAGE(has(outcome, part), part);

@@ -41,8 +41,8 @@ struct Drive {
   Drive& operator=(const Drive&) = delete;
 };
 
-struct Fixture {
-  Fixture() : folder(drive().folder) {}
+struct InertialSolveFixture {
+  InertialSolveFixture() : folder(drive().folder) {}
   static Drive& drive() {
     static Drive made;
     return made;
@@ -101,7 +101,7 @@ double sow_of(const std::string& line) {
 }
 
 /// Leaves out the rover epochs of a stretch of seconds after the recording's beginning.
-std::string rover_without(const Fixture& f, const char* name, double from_s, double to_s) {
+std::string rover_without(const InertialSolveFixture& f, const char* name, double from_s, double to_s) {
   bool skipping = false;
   return f.without(f.rover, name, [&](const std::string& line) {
     if (line.front() == '>') {  // > 2025 06 11 04 20  5.0000000  0 ..
@@ -114,7 +114,7 @@ std::string rover_without(const Fixture& f, const char* name, double from_s, dou
 
 }  // namespace
 
-TEST_CASE_FIXTURE(Fixture, "solve --imu: a drive is fixed, with attitude, velocity and biases in every file") {
+TEST_CASE_FIXTURE(InertialSolveFixture, "solve --imu: a drive is fixed, with attitude, velocity and biases in every file") {
   const Outcome outcome = solve();
   REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
   CHECK(has(outcome, "aligned"));
@@ -149,7 +149,7 @@ TEST_CASE_FIXTURE(Fixture, "solve --imu: a drive is fixed, with attitude, veloci
   CHECK(tum.substr(tum.rfind('\n', tum.size() - 2)).find("0.00000000 0.00000000 0.00000000 1.00000000") == std::string::npos);
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve --imu: no rover for 10 s: rows go on, labelled dr, and the outage is reported") {
+TEST_CASE_FIXTURE(InertialSolveFixture, "solve --imu: no rover for 10 s: rows go on, labelled dr, and the outage is reported") {
   rover = rover_without(*this, "rover_gap.obs", 60, 70);
   const Outcome outcome = solve();
   REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
@@ -165,7 +165,7 @@ TEST_CASE_FIXTURE(Fixture, "solve --imu: no rover for 10 s: rows go on, labelled
   CHECK(has(outcome, "carried on by the inertial unit"));
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve --imu: a gap in the readings costs the attitude for a while, not the position") {
+TEST_CASE_FIXTURE(InertialSolveFixture, "solve --imu: a gap in the readings costs the attitude for a while, not the position") {
   imu = without(imu, "imu_gap.csv", [](const std::string& line) { return sow_of(line) > 274850 && sow_of(line) < 274853; });
   const Outcome outcome = solve();
   REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
@@ -175,7 +175,7 @@ TEST_CASE_FIXTURE(Fixture, "solve --imu: a gap in the readings costs the attitud
   CHECK(summary().find("inertial")->find("alignment")->elements.size() == 3);
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve --imu: readings of a part of the drive: said, and GNSS alone for the rest") {
+TEST_CASE_FIXTURE(InertialSolveFixture, "solve --imu: readings of a part of the drive: said, and GNSS alone for the rest") {
   imu = without(imu, "imu_part.csv", [](const std::string& line) { return sow_of(line) > 274840; });
   const Outcome outcome = solve();
   REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
@@ -186,7 +186,7 @@ TEST_CASE_FIXTURE(Fixture, "solve --imu: readings of a part of the drive: said, 
   CHECK(all.back().status == io::SolutionStatus::fix);
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve --imu: rows at the rate of the unit lie between the solutions and move with them") {
+TEST_CASE_FIXTURE(InertialSolveFixture, "solve --imu: rows at the rate of the unit lie between the solutions and move with them") {
   REQUIRE(solve().exit_code == 0);
   const std::vector<io::TrajectoryRow> solutions = rows();
   const Outcome outcome = solve("--rate imu");
@@ -202,13 +202,13 @@ TEST_CASE_FIXTURE(Fixture, "solve --imu: rows at the rate of the unit lie betwee
     CHECK(std::any_of(all.begin(), all.end(), [&](const io::TrajectoryRow& r) { return r.time == s.time && r.status == s.status && r.p_e_m == s.p_e_m; }));
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve --imu: a given heading aligns before the car moves") {
+TEST_CASE_FIXTURE(InertialSolveFixture, "solve --imu: a given heading aligns before the car moves") {
   REQUIRE(solve("--heading 0,3").exit_code == 0);
   const std::vector<io::TrajectoryRow> all = rows();
   CHECK(std::count_if(all.begin(), all.end(), [](const io::TrajectoryRow& r) { return std::isfinite(r.heading_deg); }) > 80);
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve --imu: unusable input exits with 3 and names file, cause and remedy") {
+TEST_CASE_FIXTURE(InertialSolveFixture, "solve --imu: unusable input exits with 3 and names file, cause and remedy") {
   const auto refused = [](const Outcome& outcome, std::initializer_list<const char*> parts) {
     CHECK_MESSAGE(outcome.exit_code == 3, outcome.output);
     for (const char* part : parts) CHECK_MESSAGE(has(outcome, part), part << '\n' << outcome.output);
@@ -244,7 +244,7 @@ TEST_CASE_FIXTURE(Fixture, "solve --imu: unusable input exits with 3 and names f
   }
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve --imu: usage errors exit with 2 and say what is needed") {
+TEST_CASE_FIXTURE(InertialSolveFixture, "solve --imu: usage errors exit with 2 and say what is needed") {
   const std::string files = "solve --rover " + rover + " --base " + data + "base.obs --nav " + data + "nav.rnx --out " + path("out") + ' ';
   const auto refused = [&](const std::string& arguments, const char* part) {
     const Outcome outcome = run(files + arguments);
@@ -258,16 +258,18 @@ TEST_CASE_FIXTURE(Fixture, "solve --imu: usage errors exit with 2 and say what i
   refused("--tracks x", "--tracks x needs --imu FILE");
   refused("--without motion --rig " + rig + " --imu " + imu, "--without motion needs --tracks FILE");
   refused("--tracks x --without ears --rig " + rig + " --imu " + imu, "'ears' is none of semantic, geometric, motion, maturity");
-  refused("--with ears", "--with: 'ears' is none of wheels, cn0, code-gate, batch-size");
+  refused("--with ears", "--with: 'ears' is none of wheels, cn0, code-gate, batch-size, predicted-motion");
   refused("--with wheels", "--with wheels needs --imu FILE");
+  refused("--with predicted-motion", "--with predicted-motion needs --imu FILE");
   refused("--with batch-size", "--with batch-size needs --robust batch");
   refused("--positions x --rig " + rig + " --imu " + imu, "--positions is given: leave --rover out");
   CHECK(has(run("solve --positions x --out " + path("out")), "--positions needs --imu FILE"));
   refused("--heading 90", "--heading 90 needs --imu FILE");
+  refused("--map x", "--map needs --imu FILE");
   refused("--heading 90,0 --rig " + rig + " --imu " + imu, "the sigma must lie in 0 .. 90");
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve --imu without --base: codes of the rover alone, every epoch answered, nothing called better than a single point") {
+TEST_CASE_FIXTURE(InertialSolveFixture, "solve --imu without --base: codes of the rover alone, every epoch answered, nothing called better than a single point") {
   const Outcome outcome = run("solve --rover " + rover + " --nav " + data + "nav.rnx --imu " + imu + " --rig " + rig + " --truth " + data + "truth.csv --out " + path("out"));
   REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
   CHECK(has(outcome, "rover alone (no base)"));
@@ -279,7 +281,7 @@ TEST_CASE_FIXTURE(Fixture, "solve --imu without --base: codes of the rover alone
   CHECK(json.find("errors_m")->find("horizontal")->find("rmse")->number < 3);
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve: every policy that can be switched changes the trajectory") {
+TEST_CASE_FIXTURE(InertialSolveFixture, "solve: every policy that can be switched changes the trajectory") {
   REQUIRE(solve().exit_code == 0);
   const auto way = [this] {  // the file also has times of solving, which differ from run to run
     std::vector<double> numbers;
@@ -297,7 +299,27 @@ TEST_CASE_FIXTURE(Fixture, "solve: every policy that can be switched changes the
   }
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve --positions: loosely coupled to the positions of an earlier run") {
+TEST_CASE_FIXTURE(InertialSolveFixture, "solve --map: lanes hold a drive whose rover falls silent, the summary says how often; a broken map is refused with its line") {
+  rover = rover_without(*this, "rover_silent.obs", 40, 80);
+  const Outcome without_map = solve();
+  REQUIRE_MESSAGE(without_map.exit_code == 0, without_map.output);
+  CHECK(!has(without_map, "held in a lane of the map"));
+  const std::vector<io::TrajectoryRow> before = rows();
+  const Outcome outcome = solve("--map " + data + "streets.csv");
+  REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
+  CHECK(has(outcome, "held in a lane of the map"));
+  const std::vector<io::TrajectoryRow> after = rows();
+  REQUIRE(before.size() == after.size());
+  bool moved = false;
+  for (std::size_t i = 0; i < before.size(); ++i) moved = moved || before[i].p_e_m != after[i].p_e_m;
+  CHECK(moved);
+  REQUIRE(io::write_text_file(path("broken.csv"), "line,lat_deg,lon_deg,height_m\n1,48,11,500\n1,48,east,500\n").empty());
+  const Outcome refused = solve("--map " + path("broken.csv"));
+  CHECK(refused.exit_code == 3);
+  CHECK_MESSAGE(has(refused, "broken.csv:3"), refused.output);
+}
+
+TEST_CASE_FIXTURE(InertialSolveFixture, "solve --positions: loosely coupled to the positions of an earlier run") {
   REQUIRE(run("solve --rover " + rover + " --base " + data + "base.obs --nav " + data + "nav.rnx --rig " + rig + " --out " + path("gnss")).exit_code == 0);
   const std::string positions = path("gnss/solution.pos");
   const std::string common = " --imu " + imu + " --rig " + rig + " --truth " + data + "truth.csv --out " + path("out");
@@ -316,7 +338,7 @@ TEST_CASE_FIXTURE(Fixture, "solve --positions: loosely coupled to the positions 
   std::filesystem::remove_all(folder / "gnss");
 }
 
-TEST_CASE_FIXTURE(Fixture, "solve --tracks: frames become states, every observation has its fate, and a broken file is refused with its line") {
+TEST_CASE_FIXTURE(InertialSolveFixture, "solve --tracks: frames become states, every observation has its fate, and a broken file is refused with its line") {
   const std::string tracks = data + "stereo_tracks.csv";
   const Outcome outcome = solve("--rate camera --tracks " + tracks);
   REQUIRE_MESSAGE(outcome.exit_code == 0, outcome.output);
@@ -338,7 +360,7 @@ TEST_CASE_FIXTURE(Fixture, "solve --tracks: frames become states, every observat
   CHECK(has(broken, "the header has no column track_id"));
 }
 
-TEST_CASE_FIXTURE(Fixture, "evaluate --report: several runs on one page") {
+TEST_CASE_FIXTURE(InertialSolveFixture, "evaluate --report: several runs on one page") {
   REQUIRE(solve().exit_code == 0);
   std::filesystem::rename(folder / "out", folder / "with_imu");
   REQUIRE(run("solve --rover " + rover + " --base " + data + "base.obs --nav " + data + "nav.rnx --rig " + rig + " --out " + path("gnss_only")).exit_code == 0);

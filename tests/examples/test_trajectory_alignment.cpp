@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "examples/support/angle_units.hpp"
 #include "examples/support/trajectory_alignment.hpp"
 #include "examples/support/tum_trajectory.hpp"
 #include "support/property.hpp"
@@ -26,7 +27,7 @@ using searvins::test::uniform;
 
 namespace {
 
-constexpr double kDeg = std::numbers::pi / 180;
+using searvins::examples::kRadPerDeg;
 
 /// A smooth path of some metres, one pose in a tenth of a second.
 std::vector<TimedPose> random_path(Rng& rng, std::size_t n, double size_m) {
@@ -81,13 +82,13 @@ TEST_CASE("alignment: an error of tilt stays visible with four degrees of freedo
   for_all_seeds(30, [](Rng& rng) {
     const std::vector<TimedPose> truth = random_path(rng, 100, 5);
     const double tilt_deg = uniform(rng, 1, 10), course = uniform(rng, -3, 3);
-    const RigidMotion tilted{so3::exp(Eigen::Vector3d{kDeg * tilt_deg * Eigen::Vector3d{std::cos(course), std::sin(course), 0}}),
+    const RigidMotion tilted{so3::exp(Eigen::Vector3d{kRadPerDeg * tilt_deg * Eigen::Vector3d{std::cos(course), std::sin(course), 0}}),
                              {1, 2, 3}};
     const auto pairs = paired(moved(tilted, truth), truth);
     const auto four = absolute_error(pairs, AlignmentFreedom::yaw_and_position), six = absolute_error(pairs, AlignmentFreedom::pose);
     REQUIRE((four.ok() && six.ok()));
     CHECK(four->tilt_deg.rmse == doctest::Approx(tilt_deg).epsilon(0.02));
-    CHECK(four->position_m.rmse > 0.2 * kDeg * tilt_deg);
+    CHECK(four->position_m.rmse > 0.2 * kRadPerDeg * tilt_deg);
     CHECK(six->position_m.rmse < 1e-9);
   });
 }
@@ -173,7 +174,7 @@ TEST_CASE("relative error: blind to any rigid motion, says a scale in percent an
       const double way_m = 0.1 * i;
       truth.push_back({GpsTime{std::int64_t{i} * 100'000'000}, {way_m, 0, 0}, Eigen::Matrix3d::Identity()});
       estimate.push_back(any *
-                         TimedPose{truth.back().time, {scale * way_m, 0, 0}, so3::exp(Eigen::Vector3d{way_m * drift_deg_m * kDeg, 0, 0})});
+                         TimedPose{truth.back().time, {scale * way_m, 0, 0}, so3::exp(Eigen::Vector3d{way_m * drift_deg_m * kRadPerDeg, 0, 0})});
     }
     const auto pairs = paired(estimate, truth);
     for (const double length_m : {1.0, 10.0}) {

@@ -7,6 +7,7 @@
 
 #include <searvins/geodesy/local_frame.hpp>
 
+#include "examples/support/angle_units.hpp"
 #include "support/property.hpp"
 
 namespace geodesy = searvins::geodesy;
@@ -17,12 +18,12 @@ using searvins::test::uniform;
 
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kDegree = kPi / 180;
+using std::numbers::pi;
+using searvins::examples::kRadPerDeg;
 const Eigen::Vector3d kBase_e_m{-742080.4125, -5462031.7412, 3198339.6909};
 const Eigen::Vector3d kRover_e_m{-741205.0262, -5462376.8743, 3197933.6654};
 
-Geodetic random_place(Rng& rng) { return {uniform(rng, -1.5, 1.5), uniform(rng, -kPi, kPi), uniform(rng, -100, 9000)}; }
+Geodetic random_place(Rng& rng) { return {uniform(rng, -1.5, 1.5), uniform(rng, -pi, pi), uniform(rng, -100, 9000)}; }
 
 }  // namespace
 
@@ -56,7 +57,7 @@ TEST_CASE("local frame: the rover's parking lot seen from the base of the record
   CHECK((rover_w_m - Eigen::Vector3d{913.88, -463.65, -11.25}).cwiseAbs().maxCoeff() < 6e-3);
   CHECK(rover_w_m.norm() == doctest::Approx((kRover_e_m - kBase_e_m).norm()).epsilon(1e-12));
   const auto seen = geodesy::azimuth_elevation(kBase_e_m, kRover_e_m);
-  CHECK(seen.azimuth_rad / kDegree == doctest::Approx(116.9).epsilon(1e-3));  // east-south-east
+  CHECK(seen.azimuth_rad / kRadPerDeg == doctest::Approx(116.9).epsilon(1e-3));  // east-south-east
   CHECK(seen.elevation_rad < 0);
 }
 
@@ -66,17 +67,17 @@ TEST_CASE("azimuth and elevation: the four winds, zenith, nadir, horizon") {
     const LocalFrame frame = LocalFrame::at(p_e_m);
     const auto seen = [&](double e, double n, double u) { return geodesy::azimuth_elevation(p_e_m, frame.to_ecef({e, n, u})); };
     CHECK(std::abs(seen(0, 1e4, 0).azimuth_rad) < 1e-12);
-    CHECK(seen(1e4, 0, 0).azimuth_rad == doctest::Approx(kPi / 2));
-    CHECK(std::abs(seen(0, -1e4, 0).azimuth_rad) == doctest::Approx(kPi));
-    CHECK(seen(-1e4, 0, 0).azimuth_rad == doctest::Approx(-kPi / 2));
+    CHECK(seen(1e4, 0, 0).azimuth_rad == doctest::Approx(pi / 2));
+    CHECK(std::abs(seen(0, -1e4, 0).azimuth_rad) == doctest::Approx(pi));
+    CHECK(seen(-1e4, 0, 0).azimuth_rad == doctest::Approx(-pi / 2));
     CHECK(std::abs(seen(1e4, 2e4, 0).elevation_rad) < 1e-12);
-    CHECK(seen(0, 0, 2e7).elevation_rad == doctest::Approx(kPi / 2));
-    CHECK(seen(0, 0, -10).elevation_rad == doctest::Approx(-kPi / 2));
+    CHECK(seen(0, 0, 2e7).elevation_rad == doctest::Approx(pi / 2));
+    CHECK(seen(0, 0, -10).elevation_rad == doctest::Approx(-pi / 2));
 
-    const double azimuth = uniform(rng, -kPi, kPi), elevation = uniform(rng, -1.5, 1.5), range_m = uniform(rng, 1e3, 3e7);
+    const double azimuth = uniform(rng, -pi, pi), elevation = uniform(rng, -1.5, 1.5), range_m = uniform(rng, 1e3, 3e7);
     const auto any = seen(range_m * std::cos(elevation) * std::sin(azimuth), range_m * std::cos(elevation) * std::cos(azimuth),
                           range_m * std::sin(elevation));
-    CHECK(std::abs(std::remainder(any.azimuth_rad - azimuth, 2 * kPi)) < 1e-9);
+    CHECK(std::abs(std::remainder(any.azimuth_rad - azimuth, 2 * pi)) < 1e-9);
     CHECK(std::abs(any.elevation_rad - elevation) < 1e-10);
   });
 }

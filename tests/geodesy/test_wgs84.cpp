@@ -9,6 +9,7 @@
 
 #include <searvins/geodesy/wgs84.hpp>
 
+#include "examples/support/angle_units.hpp"
 #include "support/property.hpp"
 
 namespace geodesy = searvins::geodesy;
@@ -19,8 +20,8 @@ using searvins::test::uniform;
 namespace {
 
 using Real = long double;
-constexpr double kPi = std::numbers::pi;
-constexpr double kDegree = kPi / 180;
+using std::numbers::pi;
+using searvins::examples::kRadPerDeg;
 
 /// The forward transform in long double: truth for the inverse.
 Eigen::Matrix<Real, 3, 1> exact_ecef(const Geodetic& g) {
@@ -33,7 +34,7 @@ Eigen::Matrix<Real, 3, 1> exact_ecef(const Geodetic& g) {
 /// Distance on the ground between two geodetic positions whose latitudes and longitudes are close, metres.
 double horizontal_m(const Geodetic& a, const Geodetic& b) {
   const double radius = geodesy::kSemiMajorAxisM + std::abs(a.height_m);
-  const double east = std::remainder(a.lon_rad - b.lon_rad, 2 * kPi) * std::cos(a.lat_rad);
+  const double east = std::remainder(a.lon_rad - b.lon_rad, 2 * pi) * std::cos(a.lat_rad);
   return radius * std::hypot(a.lat_rad - b.lat_rad, east);
 }
 
@@ -52,8 +53,8 @@ Eigen::Vector3d gravity_from_potential(const Eigen::Vector3d& p_e_m) {
 }
 
 Geodetic random_geodetic(Rng& rng, double low_m, double high_m) {
-  const double lat = searvins::test::chance(rng, 0.2) ? kPi / 2 - std::pow(10.0, uniform(rng, -9, -1)) : uniform(rng, 0, kPi / 2);
-  return {searvins::test::chance(rng, 0.5) ? lat : -lat, uniform(rng, -kPi, kPi), uniform(rng, low_m, high_m)};
+  const double lat = searvins::test::chance(rng, 0.2) ? pi / 2 - std::pow(10.0, uniform(rng, -9, -1)) : uniform(rng, 0, pi / 2);
+  return {searvins::test::chance(rng, 0.5) ? lat : -lat, uniform(rng, -pi, pi), uniform(rng, low_m, high_m)};
 }
 
 /// The error of the inverse, metres, along and across the surface.
@@ -91,16 +92,16 @@ TEST_CASE("wgs84: poles, equator, date line and the centre of the Earth") {
     CAPTURE(h);
     for (const double sign : {1.0, -1.0}) {
       const Geodetic pole = geodesy::geodetic_from_ecef({0, 0, sign * (b + h)});
-      CHECK(pole.lat_rad == doctest::Approx(sign * kPi / 2).epsilon(1e-15));
+      CHECK(pole.lat_rad == doctest::Approx(sign * pi / 2).epsilon(1e-15));
       CHECK(pole.lon_rad == 0);
       CHECK(std::abs(pole.height_m - h) <= 1e-8 * (1 + std::abs(h) * 1e-7));
       const Geodetic east = geodesy::geodetic_from_ecef({0, sign * (geodesy::kSemiMajorAxisM + h), 0});
       CHECK(east.lat_rad == 0);
-      CHECK(east.lon_rad == doctest::Approx(sign * kPi / 2).epsilon(1e-15));
+      CHECK(east.lon_rad == doctest::Approx(sign * pi / 2).epsilon(1e-15));
       CHECK(std::abs(east.height_m - h) <= 1e-8 * (1 + std::abs(h) * 1e-7));
     }
     const Geodetic date_line = geodesy::geodetic_from_ecef({-(geodesy::kSemiMajorAxisM + h), 1e-9, 0});
-    CHECK(date_line.lon_rad == doctest::Approx(kPi).epsilon(1e-15));
+    CHECK(date_line.lon_rad == doctest::Approx(pi).epsilon(1e-15));
   }
   const Geodetic centre = geodesy::geodetic_from_ecef(Eigen::Vector3d::Zero());
   CHECK(centre.lat_rad == 0);
@@ -109,12 +110,12 @@ TEST_CASE("wgs84: poles, equator, date line and the centre of the Earth") {
 }
 
 TEST_CASE("wgs84: the base station of the recordings, geodetic <-> ECEF") {
-  const Geodetic base{30.290840979 * kDegree, -97.736925093 * kDegree, 169.191};
+  const Geodetic base{30.290840979 * kRadPerDeg, -97.736925093 * kRadPerDeg, 169.191};
   const Eigen::Vector3d base_e_m{-742080.4125, -5462031.7412, 3198339.6909};
   CHECK((geodesy::ecef_from_geodetic(base) - base_e_m).norm() < 6e-4);  // the printed digits
   const Geodetic back = geodesy::geodetic_from_ecef(base_e_m);
-  CHECK(std::abs(back.lat_rad - base.lat_rad) < 5.1e-10 * kDegree);
-  CHECK(std::abs(back.lon_rad - base.lon_rad) < 5.1e-10 * kDegree);
+  CHECK(std::abs(back.lat_rad - base.lat_rad) < 5.1e-10 * kRadPerDeg);
+  CHECK(std::abs(back.lon_rad - base.lon_rad) < 5.1e-10 * kRadPerDeg);
   CHECK(std::abs(back.height_m - base.height_m) < 5.1e-4);
 }
 
@@ -138,12 +139,12 @@ TEST_CASE("wgs84: R_ew is a rotation whose columns are the derivatives of positi
 
 TEST_CASE("wgs84: normal gravity, published values") {
   CHECK(geodesy::normal_gravity_mps2(0, 0) == doctest::Approx(9.7803253359).epsilon(1e-12));
-  CHECK(std::abs(geodesy::normal_gravity_mps2(kPi / 2, 0) - 9.8321849378) < 5e-9);
-  CHECK(geodesy::normal_gravity_mps2(-kPi / 2, 0) == geodesy::normal_gravity_mps2(kPi / 2, 0));
-  CHECK(std::abs(geodesy::normal_gravity_mps2(kPi / 4, 0) - 9.8061977694) < 5e-9);
-  CHECK(std::abs(geodesy::normal_gravity_mps2(30.290840979 * kDegree, 0) - 9.793477) < 2e-6);        // the base, on the ellipsoid
-  CHECK(std::abs(geodesy::normal_gravity_mps2(30.290840979 * kDegree, 169.191) - 9.792953) < 1e-6);  // and at its height
-  const double gradient = (geodesy::normal_gravity_mps2(kPi / 4, 1) - geodesy::normal_gravity_mps2(kPi / 4, -1)) / 2;
+  CHECK(std::abs(geodesy::normal_gravity_mps2(pi / 2, 0) - 9.8321849378) < 5e-9);
+  CHECK(geodesy::normal_gravity_mps2(-pi / 2, 0) == geodesy::normal_gravity_mps2(pi / 2, 0));
+  CHECK(std::abs(geodesy::normal_gravity_mps2(pi / 4, 0) - 9.8061977694) < 5e-9);
+  CHECK(std::abs(geodesy::normal_gravity_mps2(30.290840979 * kRadPerDeg, 0) - 9.793477) < 2e-6);        // the base, on the ellipsoid
+  CHECK(std::abs(geodesy::normal_gravity_mps2(30.290840979 * kRadPerDeg, 169.191) - 9.792953) < 1e-6);  // and at its height
+  const double gradient = (geodesy::normal_gravity_mps2(pi / 4, 1) - geodesy::normal_gravity_mps2(pi / 4, -1)) / 2;
   CHECK(std::abs(gradient + 3.086e-6) < 3e-9);  // the free-air gradient, 0.3086 mGal/m
 }
 

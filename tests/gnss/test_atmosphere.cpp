@@ -8,6 +8,7 @@
 #include <searvins/gnss/atmosphere.hpp>
 #include <searvins/gnss/satellite.hpp>
 
+#include "examples/support/angle_units.hpp"
 #include "rover_recordings.hpp"
 #include "support/property.hpp"
 
@@ -20,7 +21,7 @@ using test::Rng;
 using test::uniform;
 
 namespace {
-constexpr double kDegree = std::numbers::pi / 180;
+using searvins::examples::kRadPerDeg;
 constexpr double kL1Hz = 1575.42e6;
 const KlobucharCoefficients kExample{{3.82e-8, 1.49e-8, -1.79e-7, 0}, {1.43e5, 0, -3.28e5, 1.13e5}};
 
@@ -29,7 +30,7 @@ Geodetic random_place(Rng& rng) { return {uniform(rng, -1.3, 1.3), uniform(rng, 
 }  // namespace
 
 TEST_CASE("Klobuchar: the textbook example, 40 N 100 W, azimuth 210, elevation 20, 20:45 GPS time") {
-  const double delay_m = klobuchar_delay_m(kExample, {40 * kDegree, -100 * kDegree, 0}, {210 * kDegree, 20 * kDegree},
+  const double delay_m = klobuchar_delay_m(kExample, {40 * kRadPerDeg, -100 * kRadPerDeg, 0}, {210 * kRadPerDeg, 20 * kRadPerDeg},
                                            GpsTime::from_week_sow(1000, 593'100), kL1Hz);
   CHECK(delay_m == doctest::Approx(23.784).epsilon(2e-4));
 }
@@ -67,11 +68,11 @@ TEST_CASE("Klobuchar: continuous over the day but for the foot of the half cosin
 }
 
 TEST_CASE("Saastamoinen: textbook zenith delays, falling with height") {
-  const ZenithDelay sea = saastamoinen_zenith({45 * kDegree, 0, 0}, 0.7);
+  const ZenithDelay sea = saastamoinen_zenith({45 * kRadPerDeg, 0, 0}, 0.7);
   CHECK(sea.hydrostatic_m == doctest::Approx(2.307).epsilon(1e-3));  // 0.0022768 * 1013.25 hPa
   CHECK(sea.wet_m > 0.08);
   CHECK(sea.wet_m < 0.16);
-  const ZenithDelay high = saastamoinen_zenith({45 * kDegree, 0, 5500}, 0.7);
+  const ZenithDelay high = saastamoinen_zenith({45 * kRadPerDeg, 0, 5500}, 0.7);
   CHECK(high.hydrostatic_m == doctest::Approx(0.5 * sea.hydrostatic_m).epsilon(0.03));  // half of the air is above 5.5 km
   CHECK(saastamoinen_zenith({0, 0, 0}, 0).wet_m == 0);
   double before_m = 10;
@@ -85,8 +86,8 @@ TEST_CASE("Saastamoinen: textbook zenith delays, falling with height") {
 
 TEST_CASE("troposphere: the mapping is 1 at the zenith, cosecant down to 30 degrees, 5.6 at 10, finite below the horizon") {
   CHECK(troposphere_mapping(std::numbers::pi / 2) == doctest::Approx(1).epsilon(1e-5));
-  CHECK(troposphere_mapping(30 * kDegree) == doctest::Approx(2).epsilon(0.005));
-  CHECK(troposphere_mapping(10 * kDegree) == doctest::Approx(5.60).epsilon(0.005));
+  CHECK(troposphere_mapping(30 * kRadPerDeg) == doctest::Approx(2).epsilon(0.005));
+  CHECK(troposphere_mapping(10 * kRadPerDeg) == doctest::Approx(5.60).epsilon(0.005));
   CHECK(troposphere_mapping(-0.5) == troposphere_mapping(0.05));
   double before = 1e9;
   for (double e = 0.05; e < 1.57; e += 0.01) {
@@ -106,7 +107,7 @@ TEST_CASE("troposphere: the rover-base difference is antisymmetric, zero at one 
     above.height_m += 100;
     CHECK(troposphere_difference_m(above, er, rover, er) < 0);
   });
-  const Geodetic base{35 * kDegree, 137 * kDegree, 100}, rover{35 * kDegree, 137 * kDegree, 37};
+  const Geodetic base{35 * kRadPerDeg, 137 * kRadPerDeg, 100}, rover{35 * kRadPerDeg, 137 * kRadPerDeg, 37};
   CHECK(troposphere_difference_m(rover, std::numbers::pi / 2, base, std::numbers::pi / 2) == doctest::Approx(63 * 0.3e-3).epsilon(0.15));
 }
 

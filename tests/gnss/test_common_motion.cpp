@@ -41,7 +41,7 @@ TEST_CASE("set_of_four enumerates every set once") {
     std::set<std::array<std::size_t, 4>> seen;
     const std::size_t sets = n * (n - 1) * (n - 2) * (n - 3) / 24;
     for (std::size_t r = 0; r < sets; ++r) {
-      const auto s = detail::set_of_four(n, r);
+      const auto s = gnss::detail::set_of_four(n, r);
       CHECK((s[0] < s[1] && s[1] < s[2] && s[2] < s[3] && s[3] < n));
       seen.insert(s);
     }
@@ -53,10 +53,10 @@ TEST_CASE("invert_spd4 inverts, and refuses the singular") {
   for_all_seeds(100, [](Rng& rng) {
     const Eigen::Matrix4d a = random_spd(rng, 4);
     Eigen::Matrix4d inverse;
-    REQUIRE(detail::invert_spd4(a, inverse));
+    REQUIRE(gnss::detail::invert_spd4(a, inverse));
     CHECK((a * inverse - Eigen::Matrix4d::Identity()).norm() < 1e-9);
     const Eigen::Vector4d v{1, 2, 3, 4};
-    CHECK_FALSE(detail::invert_spd4(v * v.transpose(), inverse));
+    CHECK_FALSE(gnss::detail::invert_spd4(v * v.transpose(), inverse));
   });
 }
 
@@ -106,6 +106,56 @@ TEST_CASE("nothing is said with four satellites, without consensus, or where the
     (void)common_motion_check(flat, results);
     CHECK(results[8] != CheckResult::passed);
   });
+}
+
+TEST_CASE("a motion that is predicted to a centimetre: two to four satellites verify each other, and one that slipped is named by two or three others") {
+  for_all_seeds(200, [](Rng& rng) {
+    const int n = integer(rng, 2, 4);
+    const double sigma_m = uniform(rng, 0.002, 0.01), c = uniform(rng, -3e5, 3e5);
+    const Eigen::Vector3d m = random_vector<3>(rng, 5), d = m + random_vector<3>(rng, 1.5 * sigma_m);
+    const MotionPrior prior{m, sigma_m * sigma_m * Eigen::Matrix3d::Identity()};
+    Changes changes = sky(rng, n, 1, d, c);
+    Results results;
+    const MotionFit fit = predicted_motion_check(changes, prior, results);
+    REQUIRE(fit.valid);
+    CHECK(fit.satellites == n);
+    CHECK((fit.displacement_e_m - d).norm() < 3 * sigma_m);
+    for (const CheckResult r : results) CHECK(r == CheckResult::passed);
+    CHECK(!common_motion_check(changes, results).valid);
+
+    const std::size_t bad = static_cast<std::size_t>(integer(rng, 0, n - 1));
+    changes[bad].change_m += (chance(rng, 0.5) ? 1 : -1) * 0.19 * integer(rng, 1, 9);
+    const MotionFit spoilt = predicted_motion_check(changes, prior, results);
+    CHECK(spoilt.valid == (n > 2));  // of two that differ nobody knows which it is
+    for (std::size_t i = 0; i < results.size(); ++i) CHECK(results[i] == (n == 2 ? CheckResult::unavailable : i == bad ? CheckResult::failed : CheckResult::passed));
+  });
+}
+
+TEST_CASE("a vague prediction verifies nothing that it cannot tell from a slip, and nearly none adds nothing to five satellites") {
+  for_all_seeds(100, [](Rng& rng) {
+    const Eigen::Vector3d d = random_vector<3>(rng, 0.1);
+    Changes changes = sky(rng, integer(rng, 2, 4), 1, d, 7);
+    Results results;
+    (void)predicted_motion_check(changes, {Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity()}, results);
+    for (const CheckResult r : results) CHECK(r != CheckResult::passed);
+
+    changes = sky(rng, integer(rng, 7, 12), 1, random_vector<3>(rng, 5), 7);
+    const MotionFit alone = common_motion_check(changes, results);
+    const MotionFit with = predicted_motion_check(changes, {random_vector<3>(rng, 5), 1e8 * Eigen::Matrix3d::Identity()}, results);
+    REQUIRE(alone.valid);
+    REQUIRE(with.valid);
+    CHECK((alone.displacement_e_m - with.displacement_e_m).norm() < 1e-6);
+    CHECK(with.satellites == alone.satellites);
+  });
+}
+
+TEST_CASE("no prior: the covariance must be positive definite, and one satellite is no consensus") {
+  Rng rng{1};
+  Results results;
+  const Changes changes = sky(rng, 4, 1, Eigen::Vector3d::Zero(), 0);
+  CHECK(!predicted_motion_check(changes, {Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()}, results).valid);
+  CHECK(!predicted_motion_check(sky(rng, 1, 2, Eigen::Vector3d::Zero(), 0), MotionPrior{}, results).valid);
+  CHECK(results.size() == 2);
 }
 
 TEST_CASE("a threshold beyond 0.45 wavelengths verifies nothing, but still fails") {

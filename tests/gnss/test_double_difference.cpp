@@ -6,6 +6,8 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <vector>
 
 #include <searvins/gnss/double_difference.hpp>
 
@@ -28,13 +30,14 @@ struct Bench {
     options.troposphere = false;  // the simulated sky has none
     CHECK(base->set_position(s.base.p0_e_m).ok());
   }
-  Status step(const SimulatedPair& s, double dt, const Eigen::Vector3d& error_e_m = Eigen::Vector3d{3, -2, 1}) {
+  Status step(const SimulatedPair& s, double dt, const Eigen::Vector3d& error_e_m = Eigen::Vector3d{3, -2, 1},
+              const std::optional<PredictedDisplacement>& moved = {}) {
     CHECK(base->push(simulate(s.sky, s.base, dt)).ok());
-    return difference(simulate(s.sky, s.rover, dt), s, dt, error_e_m);
+    return difference(simulate(s.sky, s.rover, dt), s, dt, error_e_m, moved);
   }
   Status difference(const ObservationEpoch& rover, const SimulatedPair& s, double dt,
-                    const Eigen::Vector3d& error_e_m = Eigen::Vector3d{3, -2, 1}) {
-    return differencer->difference(rover, *base, s.sky.store, s.rover.p0_e_m + s.rover.v_e_mps * dt + error_e_m, options, *out);
+                    const Eigen::Vector3d& error_e_m = Eigen::Vector3d{3, -2, 1}, const std::optional<PredictedDisplacement>& moved = {}) {
+    return differencer->difference(rover, *base, s.sky.store, s.rover.p0_e_m + s.rover.v_e_mps * dt + error_e_m, options, *out, moved);
   }
 };
 
@@ -193,6 +196,32 @@ TEST_CASE("P11: a slip during reacquisition is no continuation: after a gap the 
       }
     CHECK(bench.step(s, 4).ok());
     for (const CorrectedSignal& c : bench.out->signals) CHECK(c.continuity == Continuity::verified);
+  });
+}
+
+TEST_CASE("single frequency, three satellites: a predicted displacement verifies them whatever the predicted positions; a wrong one does not, nor the policy off") {
+  for_all_seeds(20, [](Rng& rng) {
+    SimulatedPair s = random_pair(rng, {3, 0, 0});
+    const Eigen::Vector3d way_m = s.rover.v_e_mps + random_vector<3>(rng, 0.005);
+    const auto second_epoch = [&](const Eigen::Vector3d& moved_m, bool is_on, bool slips) {
+      Rng errors = rng;
+      SimulatedPair drive = s;
+      Bench bench{drive};
+      bench.options.slips.doppler = false, bench.options.slips.predicted_motion = is_on;
+      (void)bench.options.selection.wanted.push_back(signal("G1C"));
+      CHECK(bench.step(drive, 0, random_vector<3>(errors, 5)).ok());
+      if (slips) drive.rover.cycles[{drive.sky.satellites[1], signal("G1C")}] += 1;
+      CHECK(bench.step(drive, 1, random_vector<3>(errors, 5), PredictedDisplacement{moved_m, 1e-4 * Eigen::Matrix3d::Identity()}).ok());
+      std::vector<Continuity> seen;
+      for (const CorrectedSignal& c : bench.out->signals) seen.push_back(c.continuity);
+      return seen;
+    };
+    using C = Continuity;
+    CHECK(second_epoch(way_m, true, false) == std::vector<C>{C::verified, C::verified, C::verified});
+    CHECK(second_epoch(way_m, true, true) == std::vector<C>{C::verified, C::broken, C::verified});
+    CHECK(second_epoch(way_m, false, false) == std::vector<C>{C::unverified, C::unverified, C::unverified});
+    const std::vector<Continuity> astray = second_epoch(way_m + Eigen::Vector3d{40, -30, 20}, true, false);
+    CHECK(std::count(astray.begin(), astray.end(), Continuity::verified) < 3);
   });
 }
 

@@ -7,6 +7,7 @@
 
 #include <searvins/gnss/pivot.hpp>
 
+#include "examples/support/angle_units.hpp"
 #include "support/property.hpp"
 
 using namespace searvins;
@@ -15,11 +16,11 @@ using namespace searvins::test;
 
 namespace {
 
-constexpr double kDeg = std::numbers::pi / 180;
+using searvins::examples::kRadPerDeg;
 constexpr SatelliteId kNone{};
 
 PivotCandidate candidate(int number, double elevation_deg, double cn0, bool usable = true, bool slipped = false) {
-  return {{Constellation::gps, static_cast<std::uint8_t>(number)}, elevation_deg * kDeg, cn0, usable, slipped};
+  return {{Constellation::gps, static_cast<std::uint8_t>(number)}, elevation_deg * kRadPerDeg, cn0, usable, slipped};
 }
 SatelliteId gps(int number) { return {Constellation::gps, static_cast<std::uint8_t>(number)}; }
 
@@ -75,9 +76,9 @@ TEST_CASE("the choice does not depend on the order of the candidates, and it alw
     REQUIRE(first.index >= 0);
     const PivotCandidate p = c[static_cast<std::size_t>(first.index)];
     bool any_eligible = false;
-    for (const PivotCandidate& k : c) any_eligible = any_eligible || (k.elevation_rad >= 45 * kDeg && k.cn0_dbhz >= 30);
+    for (const PivotCandidate& k : c) any_eligible = any_eligible || (k.elevation_rad >= 45 * kRadPerDeg && k.cn0_dbhz >= 30);
     CHECK(first.fallback == !any_eligible);
-    if (any_eligible) CHECK((p.elevation_rad >= 45 * kDeg && p.cn0_dbhz >= 30));
+    if (any_eligible) CHECK((p.elevation_rad >= 45 * kRadPerDeg && p.cn0_dbhz >= 30));
     std::shuffle(c.begin(), c.end(), rng);
     CHECK(c[static_cast<std::size_t>(choose_pivot(c, previous).index)].satellite == p.satellite);
   });

@@ -4,10 +4,10 @@
 
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include <searvins/gnss/weighting.hpp>
 
+#include "examples/support/angle_units.hpp"
 #include "support/property.hpp"
 
 using namespace searvins;
@@ -17,11 +17,11 @@ using test::Rng;
 using test::uniform;
 
 namespace {
-constexpr double kDegree = std::numbers::pi / 180;
+using searvins::examples::kRadPerDeg;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 double sigma_m(const SigmaModel& m, const SignalCode& s, double elevation_deg) {
-  return std::sqrt(m.code_variance_m2(s, elevation_deg * kDegree));
+  return std::sqrt(m.code_variance_m2(s, elevation_deg * kRadPerDeg));
 }
 }  // namespace
 
@@ -41,7 +41,7 @@ TEST_CASE("urban profile: sigmas of the published table at 15, 30, 45, 60 and 90
     for (int i = 0; i < 5; ++i) CHECK(sigma_m(m, row.signal, elevations_deg[i]) == doctest::Approx(row.sigma_m[i]).epsilon(0.003));
   const double phase_m[] = {0.0236, 0.0127, 0.0095, 0.0081, 0.0073};
   for (int i = 0; i < 5; ++i)
-    CHECK(std::sqrt(m.phase_variance_m2(table[0].signal, elevations_deg[i] * kDegree)) == doctest::Approx(phase_m[i]).epsilon(0.01));
+    CHECK(std::sqrt(m.phase_variance_m2(table[0].signal, elevations_deg[i] * kRadPerDeg)) == doctest::Approx(phase_m[i]).epsilon(0.01));
   CHECK(m.doppler_variance_m2ps2() == 0.25);
 }
 
@@ -53,7 +53,7 @@ TEST_CASE("symmetric form: RTKLIB's sigmas for a = b = 3 mm and a code ratio of 
   const double elevations_deg[] = {15, 30, 45, 60, 90}, code_m[] = {5.08, 2.85, 2.21, 1.94, 1.80};
   for (int i = 0; i < 5; ++i)
     CHECK(sigma_m(m, {Constellation::gps, '1', 'C'}, elevations_deg[i]) == doctest::Approx(code_m[i]).epsilon(0.004));
-  CHECK(std::sqrt(m.phase_variance_m2({}, 15 * kDegree)) == doctest::Approx(0.0169).epsilon(0.004));
+  CHECK(std::sqrt(m.phase_variance_m2({}, 15 * kRadPerDeg)) == doctest::Approx(0.0169).epsilon(0.004));
 }
 
 TEST_CASE("every form: falls with elevation, finite at and below the horizon, undifferenced half, grows with age either way") {
@@ -100,7 +100,7 @@ TEST_CASE("geodetic profile: 0.3 / 0.3 m and 3 / 3 mm whatever the signal") {
 }
 
 TEST_CASE("screens: both sides of each limit, and what is missing") {
-  const Screening limits{15 * kDegree, 20};
+  const Screening limits{15 * kRadPerDeg, 20};
   SignalObservation s;
   CHECK(strong_enough(s, limits));  // no C/N0: benefit of the doubt
   s.cn0_dbhz = 20;
@@ -108,8 +108,8 @@ TEST_CASE("screens: both sides of each limit, and what is missing") {
   s.cn0_dbhz = 19.99;
   CHECK_FALSE(strong_enough(s, limits));
 
-  CHECK(high_enough(15 * kDegree, limits));
-  CHECK_FALSE(high_enough(14.99 * kDegree, limits));
+  CHECK(high_enough(15 * kRadPerDeg, limits));
+  CHECK_FALSE(high_enough(14.99 * kRadPerDeg, limits));
   CHECK_FALSE(high_enough(kNaN, limits));
 
   CHECK_FALSE(plausible_code(s));

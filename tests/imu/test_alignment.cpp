@@ -21,12 +21,12 @@ using test::uniform;
 
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 const Eigen::Vector3d kGravity{0, 0, -9.8};
 
 /// Attitude of any heading and of up to `tilt` radians of roll and pitch.
 Eigen::Matrix3d random_attitude(Rng& rng, double tilt) {
-  return imu::R_wb_from({uniform(rng, -tilt, tilt), uniform(rng, -tilt, tilt), uniform(rng, -kPi, kPi)});
+  return imu::R_wb_from({uniform(rng, -tilt, tilt), uniform(rng, -tilt, tilt), uniform(rng, -pi, pi)});
 }
 
 /// A rest of `seconds` at 100 Hz.
@@ -48,14 +48,14 @@ imu::RestStatistics rest_of(Rng& rng, const Eigen::Matrix3d& R_wb, const Eigen::
 }  // namespace
 
 TEST_CASE("attitude angles: a level body driving east heads 90 degrees, its forward axis is east and its right axis south") {
-  const Eigen::Matrix3d east = imu::R_wb_from({0, 0, kPi / 2});
+  const Eigen::Matrix3d east = imu::R_wb_from({0, 0, pi / 2});
   CHECK((east.col(1) - Eigen::Vector3d::UnitX()).norm() < 1e-15);
   CHECK((east.col(0) + Eigen::Vector3d::UnitY()).norm() < 1e-15);
   CHECK((east.col(2) - Eigen::Vector3d::UnitZ()).norm() < 1e-15);
-  CHECK(imu::heading_of(east) == doctest::Approx(kPi / 2));
-  CHECK(imu::course_of({3, 0, 1}) == doctest::Approx(kPi / 2));
-  CHECK(imu::course_of({0, -2, 0}) == doctest::Approx(kPi));
-  CHECK(imu::course_of({-1, 1, 0}) == doctest::Approx(-kPi / 4));
+  CHECK(imu::heading_of(east) == doctest::Approx(pi / 2));
+  CHECK(imu::course_of({3, 0, 1}) == doctest::Approx(pi / 2));
+  CHECK(imu::course_of({0, -2, 0}) == doctest::Approx(pi));
+  CHECK(imu::course_of({-1, 1, 0}) == doctest::Approx(-pi / 4));
   const Eigen::Matrix3d nose_up = imu::R_wb_from({0, 0.2, 0});
   CHECK(nose_up(2, 1) == doctest::Approx(std::sin(0.2)));  // forward axis rises
   const Eigen::Matrix3d right_down = imu::R_wb_from({0.3, 0, 0});
@@ -64,11 +64,11 @@ TEST_CASE("attitude angles: a level body driving east heads 90 degrees, its forw
 
 TEST_CASE("attitude angles: property: to angles and back, and the writer of trajectories agrees") {
   for_all_seeds(200, [](Rng& rng) {
-    const imu::AttitudeAngles a{uniform(rng, -kPi, kPi), uniform(rng, -1.5, 1.5), uniform(rng, -kPi, kPi)};
+    const imu::AttitudeAngles a{uniform(rng, -pi, pi), uniform(rng, -1.5, 1.5), uniform(rng, -pi, pi)};
     const Eigen::Matrix3d R = imu::R_wb_from(a);
     CHECK((R.transpose() * R - Eigen::Matrix3d::Identity()).norm() < 1e-14);
     CHECK(R.determinant() == doctest::Approx(1));
-    CHECK((R - io::R_wb_from_angles(a.roll_rad * 180 / kPi, a.pitch_rad * 180 / kPi, a.heading_rad * 180 / kPi)).norm() < 1e-13);
+    CHECK((R - io::R_wb_from_angles(a.roll_rad * 180 / pi, a.pitch_rad * 180 / pi, a.heading_rad * 180 / pi)).norm() < 1e-13);
     const imu::AttitudeAngles b = imu::attitude_angles(R);
     CHECK(std::abs(imu::wrapped(a.roll_rad - b.roll_rad)) < 1e-10);
     CHECK(std::abs(a.pitch_rad - b.pitch_rad) < 1e-10);
@@ -172,7 +172,7 @@ TEST_CASE("alignment at rest: property: attitude, gyroscope bias and the tie of 
 
 TEST_CASE("heading from velocity: the antenna's own motion in a turn is taken out") {
   // A vehicle heads 30 degrees at 5 m/s and turns left at 0.2 rad/s; the antenna is 2 m forward: it moves sideways to the left.
-  const double heading = 30 * kPi / 180;
+  const double heading = 30 * pi / 180;
   const Eigen::Vector3d rate{0, 0, 0.2}, arm{0.3, 2, 1};
   const Eigen::Vector3d v_level = Eigen::Vector3d{0, 5, 0} + rate.cross(arm);
   CHECK(v_level.x() == doctest::Approx(-0.4));
@@ -184,7 +184,7 @@ TEST_CASE("heading from velocity: the antenna's own motion in a turn is taken ou
 
 TEST_CASE("heading: property: from velocities and displacements with noise, the errors have the sigma they claim") {
   for_all_seeds(200, [](Rng& rng) {
-    const double heading = uniform(rng, -kPi, kPi), speed = uniform(rng, 2, 20), sigma = 0.05;
+    const double heading = uniform(rng, -pi, pi), speed = uniform(rng, 2, 20), sigma = 0.05;
     const Eigen::Vector3d forward{std::sin(heading), std::cos(heading), 0};
     const Eigen::Vector3d noise{normal(rng, sigma), normal(rng, sigma), normal(rng, sigma)};
     imu::CourseModel exact;

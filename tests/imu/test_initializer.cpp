@@ -23,8 +23,8 @@ using test::uniform;
 
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-const Eigen::Vector3d kGravity{0, 0, -9.8}, kEarth{0, 5.9e-5, 4.2e-5};
+using std::numbers::pi;
+const Eigen::Vector3d kLocalGravity{0, 0, -9.8}, kEarth{0, 5.9e-5, 4.2e-5};
 
 /// A vehicle in the plane with a unit mounted askew, its IMU at 100 Hz, its antenna's velocity and position at 1 Hz. Every step checks that the
 /// initialisation says what it waits for.
@@ -54,7 +54,7 @@ struct Drive {
       const Eigen::Vector3d forward{std::sin(heading), std::cos(heading), 0}, right{std::cos(heading), -std::sin(heading), 0};
       const Eigen::Matrix3d R_bw = R_wb().transpose();
       const Eigen::Vector3d rate = R_bw * Eigen::Vector3d{0, 0, -turn};
-      imu::ImuSample s{time, rate + R_bw * kEarth + gyro_bias, R_bw * (accel * forward + speed * turn * right - kGravity) + accel_bias};
+      imu::ImuSample s{time, rate + R_bw * kEarth + gyro_bias, R_bw * (accel * forward + speed * turn * right - kLocalGravity) + accel_bias};
       for (int k = 0; k < 3; ++k) {
         s.gyro_b_radps[k] += normal(rng, noise.gyro_noise_radps_sqrt_hz * 10);
         s.accel_b_mps2[k] += normal(rng, noise.accel_noise_mps2_sqrt_hz * 10);
@@ -84,10 +84,10 @@ TEST_CASE("initializer: at rest, then driving east: collecting, levelled, aligne
   Rng rng{1};
   Initializer initializer{settings()};
   CHECK(initializer.waits_for() == AlignmentWait::gravity);
-  CHECK(initializer.set_local_gravity(kGravity, kEarth).ok());
+  CHECK(initializer.set_local_gravity(kLocalGravity, kEarth).ok());
   CHECK(initializer.waits_for() == AlignmentWait::imu);
   Drive drive{rng, initializer};
-  drive.heading = kPi / 2;
+  drive.heading = pi / 2;
   drive.go(1, 0, 0, true);
   CHECK(initializer.state() == AlignmentState::collecting);
   CHECK(initializer.waits_for() == AlignmentWait::rest_or_velocity);
@@ -105,7 +105,7 @@ TEST_CASE("initializer: at rest, then driving east: collecting, levelled, aligne
   REQUIRE(initializer.state() == AlignmentState::aligned);
   CHECK(initializer.heading_source() == HeadingSource::velocity);
   CHECK((initializer.R_lb().col(1) - Eigen::Vector3d::UnitX()).norm() < 0.1);  // the forward axis points east
-  CHECK(std::abs(imu::wrapped(imu::heading_of(initializer.R_lb()) - kPi / 2)) < 0.1);
+  CHECK(std::abs(imu::wrapped(imu::heading_of(initializer.R_lb()) - pi / 2)) < 0.1);
   const auto a = initializer.alignment(drive.p_w + drive.R_wb() * drive.lever, 1e-4 * Eigen::Matrix3d::Identity());
   REQUIRE(a.ok());
   CHECK(a->from_rest);
@@ -124,10 +124,10 @@ TEST_CASE("initializer: property: after a rest the errors of attitude, velocity 
     s.noise.accel_bias_sigma_mps2 = 0.03;
     s.course.sigma_course_rad = 0.01;
     Initializer initializer{s};
-    REQUIRE(initializer.set_local_gravity(kGravity, kEarth).ok());
+    REQUIRE(initializer.set_local_gravity(kLocalGravity, kEarth).ok());
     Drive drive{rng, initializer};
     drive.noise = s.noise;
-    drive.heading = uniform(rng, -kPi, kPi);
+    drive.heading = uniform(rng, -pi, pi);
     drive.roll = uniform(rng, -0.1, 0.1), drive.pitch = uniform(rng, -0.1, 0.1);
     for (int k = 0; k < 3; ++k) drive.accel_bias[k] = normal(rng, 0.03), drive.gyro_bias[k] = normal(rng, 0.01);
     drive.go(uniform(rng, 3, 20), 0, 0, true);
@@ -161,9 +161,9 @@ TEST_CASE("initializer: property: after a rest the errors of attitude, velocity 
 TEST_CASE("initializer: property: pulling away in reverse gives the heading of the bonnet, not of the boot") {
   for_all_seeds(20, [](Rng& rng) {
     Initializer initializer{settings()};
-    REQUIRE(initializer.set_local_gravity(kGravity, kEarth).ok());
+    REQUIRE(initializer.set_local_gravity(kLocalGravity, kEarth).ok());
     Drive drive{rng, initializer};
-    drive.heading = uniform(rng, -kPi, kPi);
+    drive.heading = uniform(rng, -pi, pi);
     drive.go(4, 0, 0, true);
     drive.go(5, -1, 0);
     drive.go(3, 0, uniform(rng, -0.05, 0.05));
@@ -176,9 +176,9 @@ TEST_CASE("initializer: property: pulling away in reverse gives the heading of t
 TEST_CASE("initializer: property: a moving start levels between velocities and aligns within ten seconds") {
   for_all_seeds(30, [](Rng& rng) {
     Initializer initializer{settings()};
-    REQUIRE(initializer.set_local_gravity(kGravity, kEarth).ok());
+    REQUIRE(initializer.set_local_gravity(kLocalGravity, kEarth).ok());
     Drive drive{rng, initializer};
-    drive.heading = uniform(rng, -kPi, kPi);
+    drive.heading = uniform(rng, -pi, pi);
     drive.speed = uniform(rng, 8, 15);
     drive.sigma_v = uniform(rng, 0.03, 0.3);
     for (int k = 0; k < 3; ++k) drive.accel_bias[k] = normal(rng, 0.03), drive.gyro_bias[k] = normal(rng, 9e-4);
@@ -198,7 +198,7 @@ TEST_CASE("initializer: property: a moving start levels between velocities and a
 TEST_CASE("initializer: a moving start without GNSS levels coarsely and says that it waits for a heading; a given heading aligns it") {
   Rng rng{5};
   Initializer initializer{settings()};
-  REQUIRE(initializer.set_local_gravity(kGravity, kEarth).ok());
+  REQUIRE(initializer.set_local_gravity(kLocalGravity, kEarth).ok());
   Drive drive{rng, initializer};
   drive.speed = 5, drive.velocities = false;
   CHECK(initializer.set_heading(0.1, 0.05).code == StatusCode::under_determined);
@@ -211,7 +211,7 @@ TEST_CASE("initializer: a moving start without GNSS levels coarsely and says tha
   CHECK(drive.attitude_error().head<2>().norm() < 3 * initializer.sigma_tilt_rad());
 
   Initializer second{settings()};
-  REQUIRE(second.set_local_gravity(kGravity, kEarth).ok());
+  REQUIRE(second.set_local_gravity(kLocalGravity, kEarth).ok());
   Drive again{rng, second};
   again.speed = 5, again.velocities = false;
   again.go(11, 0, 0);
@@ -226,7 +226,7 @@ TEST_CASE("initializer: a moving start without GNSS levels coarsely and says tha
 TEST_CASE("initializer: a given heading at rest aligns at once, with zero velocity") {
   Rng rng{6};
   Initializer initializer{settings()};
-  REQUIRE(initializer.set_local_gravity(kGravity, kEarth).ok());
+  REQUIRE(initializer.set_local_gravity(kLocalGravity, kEarth).ok());
   Drive drive{rng, initializer};
   drive.heading = -2;
   drive.gyro_bias = {0.004, -0.003, 0.002};
@@ -245,10 +245,10 @@ TEST_CASE("initializer: a given heading at rest aligns at once, with zero veloci
 TEST_CASE("initializer: property: RTK displacements alone give the heading after a rest") {
   for_all_seeds(20, [](Rng& rng) {
     Initializer initializer{settings()};
-    REQUIRE(initializer.set_local_gravity(kGravity, kEarth).ok());
+    REQUIRE(initializer.set_local_gravity(kLocalGravity, kEarth).ok());
     Drive drive{rng, initializer};
     drive.velocities = false, drive.positions = true;
-    drive.heading = uniform(rng, -kPi, kPi);
+    drive.heading = uniform(rng, -pi, pi);
     drive.go(4, 0, 0, true);
     CHECK(initializer.state() == AlignmentState::levelled);
     drive.go(4, 1, uniform(rng, -0.01, 0.01));
@@ -263,7 +263,7 @@ TEST_CASE("initializer: property: RTK displacements alone give the heading after
 TEST_CASE("initializer: one wild velocity does not point the vehicle anywhere; a vague one and a turn are named") {
   Rng rng{7};
   Initializer initializer{settings()};
-  REQUIRE(initializer.set_local_gravity(kGravity, kEarth).ok());
+  REQUIRE(initializer.set_local_gravity(kLocalGravity, kEarth).ok());
   Drive drive{rng, initializer};
   drive.go(4, 0, 0, true);
   drive.velocities = false;
@@ -294,7 +294,7 @@ TEST_CASE("initializer: a gap starts anew; bad input is refused and changes noth
   CHECK(initializer.add_velocity(drive.time, {1, 2, 3}, 0.1).code == StatusCode::stale);
   drive.go(3, 0, 0, true);  // rests before gravity is known
   CHECK(initializer.waits_for() == AlignmentWait::gravity);
-  REQUIRE(initializer.set_local_gravity(kGravity, kEarth).ok());
+  REQUIRE(initializer.set_local_gravity(kLocalGravity, kEarth).ok());
   drive.go(0.6, 0, 0, true);
   CHECK(initializer.state() == AlignmentState::levelled);  // and the rest counted
 

@@ -18,7 +18,7 @@ using test::value_cell;
 
 namespace {
 
-const GpsTime kStart = gps_from_civil({2024, 6, 24, 8, 20, 0.0});
+const GpsTime kFileStart = gps_from_civil({2024, 6, 24, 8, 20, 0.0});
 
 /// One RINEX 3 file from types and a body.
 std::string file_3(const std::string& types, const std::string& body, double version = 3.04, const std::string& records = "") {
@@ -63,7 +63,7 @@ TEST_CASE("header: marker, position, antenna, interval, leap seconds, phase shif
   CHECK(h.phase_shifts[0].signal == test::signal("G2X"));
   CHECK(h.phase_shifts[0].cycles == -0.25);
   CHECK(h.clock_offset_applied);
-  CHECK(h.first_observation == kStart);
+  CHECK(h.first_observation == kFileStart);
   REQUIRE(h.layouts[0].signals.size() == 1);
   CHECK(h.layouts[0].signals[0] == test::signal("G1C"));
   CHECK(h.layouts[0].columns.size() == 3);
@@ -199,7 +199,7 @@ TEST_CASE("tags in BeiDou time and UTC become GPS time") {
     const auto epochs =
         epochs_of(test::observation_header(3.04, kTypesG + first, file_system) + epoch_line("00", 1) + "G07" + value_cell(2e7) + '\n');
     REQUIRE(epochs.size() == 1);
-    return seconds_between(kStart, epochs[0].tag);
+    return seconds_between(kFileStart, epochs[0].tag);
   };
   CHECK(tag("GPS", "M") == 0);
   CHECK(tag("GAL", "M") == 0);
@@ -218,7 +218,7 @@ TEST_CASE("the receiver clock offset of the epoch line is kept aside") {
   REQUIRE(reader.open_text(file_3(kTypesG, line + "G07" + value_cell(2e7) + '\n' + epoch_line("01", 1) + "G07" + value_cell(2e7) + '\n')));
   auto epoch = reader.next();
   REQUIRE(epoch);
-  CHECK(epoch->tag == kStart);
+  CHECK(epoch->tag == kFileStart);
   CHECK(reader.receiver_clock_offset_s() == -0.000123456789);
   epoch = reader.next();
   REQUIRE(epoch);

@@ -15,6 +15,7 @@
 
 namespace so3 = searvins::so3;
 using searvins::StatusCode;
+using searvins::test::random_direction;
 using searvins::test::Rng;
 
 namespace {
@@ -68,13 +69,6 @@ Real even_error(const Eigen::Matrix<S, 3, 3>& a, const RealMatrix& truth) {
   return ((x + x.transpose()) - (truth + truth.transpose())).norm() / truth.norm();
 }
 
-Eigen::Vector3d random_axis(Rng& rng) {
-  Eigen::Vector3d v;
-  do v = searvins::test::random_vector<3>(rng);
-  while (v.norm() < 0.1 || v.norm() > 1);
-  return v.normalized();
-}
-
 /// Angles on a log-spaced grid from 1e-9 to pi, from pi - 1 towards pi, and on both sides of the seam at 1 (and at 2, where the half
 /// angle passes it).
 template <class S>
@@ -98,7 +92,7 @@ struct Angle {
 
 template <class S>
 Angle<S> angle_about(Rng& rng, S t) {
-  const Eigen::Matrix<S, 3, 1> theta = random_axis(rng).cast<S>() * t;
+  const Eigen::Matrix<S, 3, 1> theta = random_direction(rng).cast<S>() * t;
   return {theta, theta.template cast<Real>()};
 }
 

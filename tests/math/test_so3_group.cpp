@@ -14,12 +14,13 @@
 
 namespace so3 = searvins::so3;
 using searvins::StatusCode;
+using searvins::test::random_direction;
 using searvins::test::Rng;
 
 namespace {
 
 template <class S>
-constexpr S kEps = std::numeric_limits<S>::epsilon();
+constexpr S kMachineEps = std::numeric_limits<S>::epsilon();
 
 /// |a - b|, each side evaluated first: one instantiation instead of one an expression.
 double distance(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) { return (a - b).norm(); }
@@ -27,18 +28,11 @@ double distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return (a 
 
 const Eigen::Matrix3d kIdentity = Eigen::Matrix3d::Identity();
 
-Eigen::Vector3d random_axis(Rng& rng) {
-  Eigen::Vector3d v;
-  do v = searvins::test::random_vector<3>(rng);
-  while (v.norm() < 0.1 || v.norm() > 1);
-  return v.normalized();
-}
-
 }  // namespace
 
 TEST_CASE("exp is a homomorphism on one axis, orthogonal, proper, and the Hamilton quaternion gives the same matrix") {
   searvins::test::for_all_seeds(500, [](Rng& rng) {
-    const Eigen::Vector3d axis = random_axis(rng), theta = axis * searvins::test::uniform(rng, -20, 20);
+    const Eigen::Vector3d axis = random_direction(rng), theta = axis * searvins::test::uniform(rng, -20, 20);
     const Eigen::Matrix3d R = so3::exp(theta);
     CHECK(distance(R.transpose() * R, kIdentity) <= 1e-14);
     CHECK(R.determinant() == doctest::Approx(1).epsilon(1e-14));
@@ -63,7 +57,7 @@ TEST_CASE("exp is a homomorphism on one axis, orthogonal, proper, and the Hamilt
 
 TEST_CASE("Jacobians are what they say: central differences of exp and log") {
   searvins::test::for_all_seeds(200, [](Rng& rng) {
-    const Eigen::Vector3d theta = random_axis(rng) * searvins::test::uniform(rng, 0.0, 3.1);
+    const Eigen::Vector3d theta = random_direction(rng) * searvins::test::uniform(rng, 0.0, 3.1);
     const Eigen::Matrix3d R = so3::exp(theta);
     const double h = 1e-5;
     Eigen::Matrix3d right, left, right_of_log, left_of_log;
@@ -86,17 +80,17 @@ TEST_CASE("Jacobians are what they say: central differences of exp and log") {
 TEST_CASE_TEMPLATE("normalise and orthonormalise remove drift and refuse what is no rotation", S, float, double) {
   using Matrix = Eigen::Matrix<S, 3, 3>;
   searvins::test::for_all_seeds(200, [](Rng& rng) {
-    const Matrix R = so3::exp((random_axis(rng) * searvins::test::uniform(rng, 0, 3)).cast<S>());
+    const Matrix R = so3::exp((random_direction(rng) * searvins::test::uniform(rng, 0, 3)).cast<S>());
     const double size = std::pow(10.0, searvins::test::uniform(rng, -7, -1));
     Matrix noise, stretch;
     for (int i = 0; i < 9; ++i) noise.data()[i] = static_cast<S>(searvins::test::uniform(rng, -size, size));
     const auto clean = so3::orthonormalise(R + noise);
     REQUIRE(clean.ok());
-    CHECK((clean->transpose() * *clean - Matrix::Identity()).norm() <= 8 * kEps<S>);
-    CHECK((*clean - R).norm() <= noise.norm() * S(1.5) + 8 * kEps<S>);
-    CHECK((*so3::orthonormalise(*clean) - *clean).norm() <= 8 * kEps<S>);
+    CHECK((clean->transpose() * *clean - Matrix::Identity()).norm() <= 8 * kMachineEps<S>);
+    CHECK((*clean - R).norm() <= noise.norm() * S(1.5) + 8 * kMachineEps<S>);
+    CHECK((*so3::orthonormalise(*clean) - *clean).norm() <= 8 * kMachineEps<S>);
     stretch = R * (Matrix::Identity() + (noise + noise.transpose()) / S(4));  // R is the polar factor of R times a positive matrix
-    CHECK((*so3::orthonormalise(stretch) - R).norm() <= 16 * kEps<S>);
+    CHECK((*so3::orthonormalise(stretch) - R).norm() <= 16 * kMachineEps<S>);
 
     const Eigen::Quaternion<S> q = so3::quaternion_from_matrix(R);
     for (const S scale : {std::numeric_limits<S>::min(), S(0.1), S(-2), std::numeric_limits<S>::max() / S(4)}) {
@@ -104,8 +98,8 @@ TEST_CASE_TEMPLATE("normalise and orthonormalise remove drift and refuse what is
       scaled.coeffs() = q.coeffs() * scale;
       const auto unit = so3::normalise(scaled);
       REQUIRE(unit.ok());
-      CHECK((unit->coeffs() - (scale < S(0) ? S(-1) : S(1)) * q.coeffs()).norm() <= 8 * kEps<S>);
-      CHECK((so3::matrix_from_quaternion(scaled) - R).norm() <= 16 * kEps<S>);
+      CHECK((unit->coeffs() - (scale < S(0) ? S(-1) : S(1)) * q.coeffs()).norm() <= 8 * kMachineEps<S>);
+      CHECK((so3::matrix_from_quaternion(scaled) - R).norm() <= 16 * kMachineEps<S>);
     }
   });
   Matrix reflection = Matrix::Identity();

@@ -15,8 +15,8 @@ using namespace searvins::test;
 
 namespace {
 
-constexpr int kMaxFront = 40, kDof = 3;
-using Local = smoother::LocalElimination<double, kDof, kMaxFront>;
+constexpr int kFrontRows = 40, kDof = 3;
+using LocalOfThree = smoother::LocalElimination<double, kDof, kFrontRows>;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
@@ -26,7 +26,7 @@ struct Measured {
   MatrixXd H;  ///< of [local, front, residual]
 
   /// `rows` of them each from one block; those of `rank` < dof see the first axes of the local variable only.
-  Measured(Rng& rng, int dof_, int e, int s, int rank, Local& local) : dof(dof_), n(e + s + 1), H(MatrixXd::Zero(dof_ + n, dof_ + n)) {
+  Measured(Rng& rng, int dof_, int e, int s, int rank, LocalOfThree& local) : dof(dof_), n(e + s + 1), H(MatrixXd::Zero(dof_ + n, dof_ + n)) {
     local.begin(e);
     for (int m = 0; m < 6; ++m) {
       const int side = e == 0 ? 1 : s == 0 ? 0 : integer(rng, 0, 1);
@@ -49,7 +49,7 @@ struct Measured {
   }
 
  private:
-  void add(const MatrixXd& J, int first, int count, Local& local) {
+  void add(const MatrixXd& J, int first, int count, LocalOfThree& local) {
     H += J.transpose() * J;
     local.touch(first, count);
     local.touch(n - 1, 1);
@@ -67,7 +67,7 @@ VectorXd diagonal_of(const Measured& m) { return m.H.diagonal().head(m.dof); }
 
 TEST_CASE("local elimination: the front becomes the Schur complement, time after time with one object") {
   for_all_seeds(100, [](Rng& rng) {
-    Local local;
+    LocalOfThree local;
     for (int again = 0; again < 4; ++again) {
       const int e = integer(rng, 0, 20), s = integer(rng, e == 0 ? 1 : 0, 19), dof = integer(rng, 1, kDof), rank = integer(rng, 1, dof);
       const Measured m{rng, dof, e, s, rank, local};
@@ -83,7 +83,7 @@ TEST_CASE("local elimination: the front becomes the Schur complement, time after
 
 TEST_CASE("local elimination: columns that no measurement touched keep their bits") {
   for_all_seeds(100, [](Rng& rng) {
-    Local local;
+    LocalOfThree local;
     const Measured m{rng, 3, 20, 19, 3, local};
     FrontUnderTest<double> f{20, 19};
     const MatrixXd before = random_spd(rng, 40);
@@ -96,7 +96,7 @@ TEST_CASE("local elimination: columns that no measurement touched keep their bit
 
 TEST_CASE("local elimination: a number that is none is reported, the front is as before and the next variable unharmed") {
   for_all_seeds(50, [](Rng& rng) {
-    Local local;
+    LocalOfThree local;
     const Measured bad{rng, 3, 10, 10, 3, local};
     local.H(1, 1) = std::numeric_limits<double>::quiet_NaN();
     FrontUnderTest<double> f{10, 10};

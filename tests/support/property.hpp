@@ -56,6 +56,14 @@ Eigen::Matrix<double, N, 1> random_vector(Rng& rng, double size = 1.0) {
   return v;
 }
 
+/// A direction, uniform on the sphere.
+inline Eigen::Vector3d random_direction(Rng& rng) {
+  Eigen::Vector3d v;
+  do v = random_vector<3>(rng);
+  while (v.norm() < 0.1 || v.norm() > 1);
+  return v.normalized();
+}
+
 /// A random symmetric positive definite matrix with condition number about `condition`.
 inline Eigen::MatrixXd random_spd(Rng& rng, int n, double condition = 1e3) {
   Eigen::MatrixXd a(n, n);

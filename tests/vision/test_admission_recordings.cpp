@@ -20,7 +20,7 @@ using namespace searvins::vision;
 
 namespace {
 
-using Admission = StereoAdmission<kTwinTracks>;
+using TwinAdmission = StereoAdmission<kTwinTracks>;
 constexpr SemanticClass kVegetation = 3, kVehicle = 4;  // reject_classes of the rig
 
 struct Outcome {
@@ -42,8 +42,8 @@ AdmissionOptions twin_options() {
 
 Outcome admit(const TwinDrive& drive, const AdmissionOptions& options) {
   Outcome outcome;
-  const auto admission = std::make_unique<Admission>(twin_camera(), options);
-  const auto out = std::make_unique<Admission::Admitted>();
+  const auto admission = std::make_unique<TwinAdmission>(twin_camera(), options);
+  const auto out = std::make_unique<TwinAdmission::Admitted>();
   for (std::size_t i = 0; i < drive.frames.size(); ++i) {
     const TwinFrame& frame = drive.frames[i];
     const std::optional<CameraMotion>& truth = drive.motions[i];

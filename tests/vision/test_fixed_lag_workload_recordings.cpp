@@ -20,7 +20,7 @@ using namespace searvins::test;
 namespace {
 
 /// What a run gives and what the others gave over the same frames, m.
-struct Outcome {
+struct WorkloadOutcome {
   std::size_t frames{0};
   bool whole{false};
   double rmse_m{0}, peer_rmse_m{0};  ///< newest state, against truth; the worse of the two peers
@@ -30,12 +30,12 @@ struct Outcome {
 };
 
 /// Nothing when the shared data is not there. SEARVINS_PROPERTY_RUNS below 100 shortens the drive.
-std::optional<Outcome> run(const std::string& name, const std::string& results) {
+std::optional<WorkloadOutcome> run(const std::string& name, const std::string& results) {
   const auto shared = shared_data();
   const auto workload = shared ? read_fixed_lag_workload(*shared / "peers/fixed_lag" / name) : std::nullopt;
   if (!workload) return std::nullopt;
   const std::size_t all = workload->frames.size();
-  Outcome o;
+  WorkloadOutcome o;
   o.frames = std::min<std::size_t>(all, property_runs(static_cast<unsigned>(all)));
   o.whole = o.frames == all;
   FixedLagRun run(*workload, FixedLagRun::options_of(1));

@@ -10,11 +10,11 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <numbers>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "examples/support/angle_units.hpp"
 #include "support/property.hpp"
 #include "support/shared_data.hpp"
 
@@ -24,7 +24,7 @@ using vision::CameraMotion;
 
 namespace {
 
-using Pnp = vision::StereoPnp<1024>;
+using RecordedPnp = vision::StereoPnp<1024>;
 using Frame = std::map<std::uint64_t, vision::StereoPixel<double>>;
 
 struct Drive {
@@ -63,12 +63,12 @@ struct Drift {
 /// `wrong`: share of the pairs whose current observation is replaced by that of another track.
 Drift chain(const Drive& drive, const vision::PnpOptions& options, double wrong = 0) {
   Rng rng{11};
-  auto pnp = std::make_unique<Pnp>(drive.camera, options);
+  auto pnp = std::make_unique<RecordedPnp>(drive.camera, options);
   Drift drift;
   CameraMotion pose = drive.poses.begin()->second;
   for (auto now = std::next(drive.frames.begin()); now != drive.frames.end(); ++now) {
     const auto before = std::prev(now);
-    Pnp::Pairs pairs;
+    RecordedPnp::Pairs pairs;
     for (const auto& [track, pixel] : now->second)
       if (const auto seen = before->second.find(track); seen != before->second.end()) (void)pairs.push_back({seen->second, pixel});
     const int last = static_cast<int>(pairs.size()) - 1;
@@ -97,10 +97,10 @@ Drift chain(const Drive& drive, const vision::PnpOptions& options, double wrong 
 }
 
 std::string text_of(const Drift& d) {
-  constexpr double kDeg = 180 / std::numbers::pi;
+  using searvins::examples::kDegPerRad;
   std::ostringstream out;
   out << d.frames + 1 << " frames, " << d.distance_m << " m: drift " << 100 * d.end_error_m / d.distance_m << " %, "
-      << kDeg * d.end_turn_rad / d.distance_m << " deg/m; a step is off by " << d.step_rms_m << " m and " << kDeg * d.step_turn_rms_rad
+      << kDegPerRad * d.end_turn_rad / d.distance_m << " deg/m; a step is off by " << d.step_rms_m << " m and " << kDegPerRad * d.step_turn_rms_rad
       << " deg rms; inliers " << 100 * d.share << " %, " << d.rms_px << " px";
   return out.str();
 }
@@ -118,18 +118,18 @@ TEST_CASE("stereo odometry on real tracks of two drives: drift per distance") {
   const Drive many = read_drive(folder / "VO_calibration00s.txt", folder / "VO_camera_poses00s.txt", folder / "VO_stereo_factors00s.txt");
   REQUIRE(few.frames.size() == 26);
   REQUIRE(many.frames.size() == 77);
-  constexpr double kDeg = 180 / std::numbers::pi;
+  using searvins::examples::kDegPerRad;
   const Drift a = chain(few, {}), b = chain(many, {});
   MESSAGE(text_of(a));
   MESSAGE(text_of(b));
   for (const Drift& d : {a, b}) {
     CHECK(d.end_error_m < 0.002 * d.distance_m);
-    CHECK(kDeg * d.end_turn_rad < 0.005 * d.distance_m);
+    CHECK(kDegPerRad * d.end_turn_rad < 0.005 * d.distance_m);
     CHECK(d.share > 0.95);
   }
   const Drift spoiled = chain(many, {}, 0.4);
   MESSAGE("with 40 % of the associations exchanged: " << text_of(spoiled));
   CHECK(spoiled.end_error_m < 0.003 * spoiled.distance_m);
-  CHECK(kDeg * spoiled.end_turn_rad < 0.006 * spoiled.distance_m);
+  CHECK(kDegPerRad * spoiled.end_turn_rad < 0.006 * spoiled.distance_m);
   CHECK(spoiled.share < 0.65);
 }

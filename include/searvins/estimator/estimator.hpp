@@ -126,6 +126,9 @@ class Estimator {
   /// A heading from elsewhere, clockwise from north, of the present moment. Errors: those of imu::Initializer::set_heading.
   Status set_heading(double heading_rad, double sigma_rad) { return initializer_.set_heading(heading_rad, sigma_rad); }
 
+  /// A map of lanes for stretches without integers (options: inertial.lanes, inertial.lane_way_m), in the caller's memory for as long as it is used.
+  void set_centrelines(imu::Centrelines lines) { bound_.motion().set_centrelines(lines); }
+
   /// A reading, in time order. Errors: non_finite, duplicate, out_of_order, capacity_exceeded (ask next() for solutions more often).
   Status add_imu(const imu::ImuSample& sample) {
     if (!sample.finite()) return failure(StatusCode::non_finite, "IMU sample with a NaN or infinite reading");

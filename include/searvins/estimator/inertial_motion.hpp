@@ -7,6 +7,9 @@
 /// held in a rest, its states also share a place (stationary/position_anchor.hpp), latched where the rest began or the integers ended; its prior is
 /// widened, because the states of the window hold the same information already.
 ///
+/// Where the caller gave a map of lanes (set_centrelines(); opt-in), a moving state without integers lies on the lane that imu/centreline.hpp finds it on:
+/// one state in each lane_way_m, because the offset from the middle of a lane lasts and is no new measurement a second later.
+///
 /// The antenna of a state is a lever arm away and swings with the body (imu/lever_arm.hpp). Its covariance follows from that of the state by the
 /// Jacobians of both.
 #pragma once
@@ -24,6 +27,8 @@
 #include <searvins/estimator/rtk_options.hpp>
 #include <searvins/estimator/rtk_solution.hpp>
 #include <searvins/geodesy/local_frame.hpp>
+#include <searvins/imu/centreline.hpp>
+#include <searvins/imu/centreline_factor.hpp>
 #include <searvins/imu/earth.hpp>
 #include <searvins/imu/imu_factor.hpp>
 #include <searvins/imu/imu_sample.hpp>
@@ -60,6 +65,8 @@ struct InertialOptions {
   Eigen::Vector3d axle_b_m{Eigen::Vector3d::Zero()};       ///< middle of the axle that does not steer
   double non_holonomic_sigma_mps{0.1};
   double non_holonomic_from_mps{1};                        ///< slower, the direction of travel is not the body's
+  imu::CentrelineOptions lanes{};                          ///< how the map of set_centrelines() is matched
+  double lane_way_m{50};                                   ///< driven between two states that a lane holds
 };
 
 /// See the file comment. `SampleCapacity`: readings between two states.
@@ -78,11 +85,14 @@ class InertialMotion {
   using Factors = smoother::Types<smoother::Capacity<imu::NavigationPriorFactor, 1>, smoother::Capacity<imu::ImuFactor<Earth>, Cap::states>,
                                   smoother::Capacity<stationary::ZeroVelocityFactor, Cap::states>, smoother::Capacity<stationary::ZeroAngularRateFactor, Cap::states>,
                                   smoother::Capacity<stationary::NonHolonomicFactor, Cap::states>, smoother::Capacity<imu::PositionFactor, Cap::states>,
+                                  smoother::Capacity<imu::CentrelineFactor, Cap::states>,
                                   smoother::Capacity<stationary::PositionAnchorFactor, Cap::states>, smoother::Capacity<stationary::PositionAnchorPriorFactor, 4>>;
 
   explicit InertialMotion(const RtkOptions&, const Options& options = {}) : options_(options), detector_(options.preintegration.noise, options.detector) {}
 
-  void set_frame(const geodesy::LocalFrame& frame) { earth_ = Earth{frame}; }
+  void set_frame(const geodesy::LocalFrame& frame) { earth_ = Earth{frame}, has_lane_ = false; }
+  /// A map, in the caller's memory for as long as this is used; an empty one ends its use.
+  void set_centrelines(imu::Centrelines lines) { lines_ = lines, has_lane_ = false; }
   [[nodiscard]] const Options& options() const { return options_; }
   [[nodiscard]] const Earth& earth() const { return earth_; }
   [[nodiscard]] const stationary::Detector& detector() const { return detector_; }
@@ -171,6 +181,7 @@ class InertialMotion {
     else
       hold_place(smoother, to, to_time, imu::predict(*smoother.find(from), *motion, earth_).p_wb_m);
     if (options_.non_holonomic && !out.stationary && smoother.find(to)->v_wb_mps.norm() > options_.non_holonomic_from_mps) keep_on_wheels(smoother, to, to_time);
+    if (!lines_.empty() && is_float_ && !out.stationary) out.in_lane = keep_in_lane(smoother, to, to_time);
     return ok_status();
   }
 
@@ -253,6 +264,22 @@ class InertialMotion {
     f.sigma_lateral_mps = f.sigma_vertical_mps = options_.non_holonomic_sigma_mps;
     (void)smoother.add_factor(f);
   }
+  /// Whether the map holds this state. Its covariance is that of the state before, which matters little: a lane is metres wide.
+  template <class Smoother>
+  bool keep_in_lane(Smoother& smoother, smoother::Key<State> key, GpsTime t) {
+    const State& x = *smoother.find(key);
+    const Antenna antenna = antenna_at(t);
+    const Eigen::Matrix3d& R_ew = earth_.frame.R_ew;
+    const Eigen::Vector3d p_w_m = antenna.position_w_m(x);
+    if (has_lane_ && (p_w_m - lane_place_w_m_).norm() < options_.lane_way_m) return false;
+    const imu::CentrelineMatch lane = imu::match_centreline(lines_, earth_.frame.to_ecef(p_w_m), R_ew * antenna.velocity_w_mps(x),
+                                                            R_ew * position_covariance_m2_ * R_ew.transpose(), options_.lanes);
+    if (lane.verdict != imu::CentrelineVerdict::matched) return false;
+    const imu::CentrelineFactor factor{key, antenna, earth_.frame.to_local(lane.point_e_m), R_ew.transpose() * lane.right_e, options_.lanes.sigma_m};
+    if (!smoother.add_factor(factor).ok()) return false;
+    has_lane_ = true, lane_place_w_m_ = p_w_m;
+    return true;
+  }
 
   Options options_;
   Earth earth_{};
@@ -262,6 +289,9 @@ class InertialMotion {
   smoother::Key<stationary::PositionAnchor> anchor_{};  ///< of the present rest
   Eigen::Matrix3d position_covariance_m2_{Eigen::Matrix3d::Identity()};
   double sigma_velocity_mps_{1};
+  imu::Centrelines lines_{};
+  Eigen::Vector3d lane_place_w_m_{Eigen::Vector3d::Zero()};  ///< of the last state that a lane holds
+  bool has_lane_{false};
   bool is_float_{true}, rest_cue_{false};
 };
 

@@ -31,6 +31,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 
 #include <searvins/ambiguity/continuation.hpp>
 #include <searvins/ambiguity/resolution.hpp>
@@ -95,10 +96,12 @@ class RtkEstimator {
     is_undifferenced_ = false;
     if (!is_differenced) continuation_.skip_epoch();
     if (!is_differenced && goes_on_without_gnss()) without_base(rover);
-    if ((is_differenced || goes_on_without_gnss()) && extend(out))
+    const bool is_extended = (is_differenced || goes_on_without_gnss()) && extend(out);
+    if (is_extended)
       estimate(out);
     else
       without_differences(tracked, out);
+    if (differenced.ok()) compared_ = Compared{out.time, out.position_e_m, is_extended};
     return out;
   }
 
@@ -199,6 +202,12 @@ class RtkEstimator {
     AmbiguityKey a{}, b{};
     ambiguity::ArcId arc{};
   };
+  /// The epoch that the differencer remembers, and where the antenna was then.
+  struct Compared {
+    GpsTime time{};
+    Eigen::Vector3d position_e_m{Eigen::Vector3d::Zero()};
+    bool is_estimated{false};
+  };
   /// An integer constraint in the window.
   struct Held {
     smoother::Key<gnss::IntegerFix> factor{};
@@ -273,6 +282,7 @@ class RtkEstimator {
         predicted_e_m_ = frame_.to_ecef(antenna.position_w_m(predicted_));
         predicted_v_e_mps_ = frame_.R_ew * antenna.velocity_w_mps(predicted_);
         predicted_position_m2_ = P.template topLeftCorner<3, 3>();
+        predicted_velocity_e_mps2_ = frame_.R_ew * P.template bottomRightCorner<3, 3>() * frame_.R_ew.transpose();
         predicted_sigma_m_ = std::sqrt(std::max(1e-4, predicted_position_m2_.trace()));
         return;
       }
@@ -287,10 +297,18 @@ class RtkEstimator {
 
   Status difference(const gnss::ObservationEpoch& rover, const Result<gnss::TrackedPosition>& tracked, RtkSolution& out) {
     predict(tracked, out);
-    const Status s = differencer_.difference(rover, base_, ephemerides_, predicted_e_m_, options_.differencing, epoch_);
+    const Status s = differencer_.difference(rover, base_, ephemerides_, predicted_e_m_, options_.differencing, epoch_, moved_since_compared(out));
     if (!s.ok()) return s;
     if (epoch_.base_status.ok()) out.base_age_s = epoch_.base_age_s;
     return epoch_.base_status;
+  }
+
+  /// The antenna's way since the epoch that the next one's phases are compared with, where readings predict it. Over seconds the error of a way is that of
+  /// the velocity times the time.
+  [[nodiscard]] std::optional<gnss::PredictedDisplacement> moved_since_compared(const RtkSolution& out) const {
+    if (!Motion::is_inertial || !is_predicted_ || !compared_.is_estimated) return std::nullopt;
+    const double dt_s = seconds_between(compared_.time, out.time);
+    return gnss::PredictedDisplacement{predicted_e_m_ - compared_.position_e_m, dt_s * dt_s * predicted_velocity_e_mps2_};
   }
 
   /// What is left of the epoch are its Doppler shifts, which need no base.
@@ -1011,6 +1029,8 @@ class RtkEstimator {
   Eigen::Vector3d predicted_e_m_{Eigen::Vector3d::Zero()}, predicted_v_e_mps_{Eigen::Vector3d::Zero()};
   double predicted_sigma_m_{100}, clock_offset_s_{0};
   Eigen::Matrix3d predicted_position_m2_{Eigen::Matrix3d::Identity()};  ///< of the predicted antenna, in w
+  Eigen::Matrix3d predicted_velocity_e_mps2_{Eigen::Matrix3d::Identity()};  ///< of its velocity, (m/s)^2
+  Compared compared_{};
   State predicted_{}, last_state_{};  ///< of the epoch at hand by the motion alone; the newest estimate
   StateCovariance predicted_covariance_{StateCovariance::Identity()}, last_covariance_{StateCovariance::Identity()};
   typename Motion::Antenna antenna_{};  ///< at the epoch at hand

@@ -65,6 +65,7 @@ struct RtkSolution {
   bool restarted{false};    ///< the window was started (anew) at this epoch
   bool has_attitude{false};  ///< an inertial estimator is aligned: the next members count
   bool stationary{false};    ///< the inertial unit says that the vehicle stands
+  bool in_lane{false};       ///< a centre line of the map holds this state
   Eigen::Matrix3d R_nb{Eigen::Matrix3d::Identity()};            ///< body to East-North-Up at the position
   Eigen::Vector3d attitude_sigma_rad{Eigen::Vector3d::Zero()};  ///< about east, north, up
   Eigen::Vector3d accel_bias_b_mps2{Eigen::Vector3d::Zero()}, gyro_bias_b_radps{Eigen::Vector3d::Zero()};

@@ -16,6 +16,11 @@
 /// The residual of a satellite is divided by 1 - leverage (its own vote), so that one which the rest cannot predict is not declared sound
 /// by itself.
 ///
+/// Inertial readings tell d beforehand, d ~ N(m, P). Then two satellites are a consensus: d = m and the c of any one satellite are a start, and the
+/// least squares over whoever agrees has s^2 P^-1 in its normal matrix and s^2 P^-1 m on its right (s: sigma of a change, a seventh of its threshold).
+/// The residual free of the satellite's own vote then has the variance s^2 / (1 - leverage); where three of its sigmas are more than the threshold they
+/// take its place, so that the wavelength decides how vague a prediction may be. It is asked where the satellites alone are too few or disagree.
+///
 /// For fewer satellites: the common change, c alone; i must agree with at least half of the signals of other satellites.
 #pragma once
 
@@ -30,6 +35,7 @@
 #include <searvins/core/static_vector.hpp>
 #include <searvins/gnss/cycle_slip.hpp>
 #include <searvins/gnss/signal.hpp>
+#include <searvins/math/small_cholesky.hpp>
 
 namespace searvins::gnss {
 
@@ -49,6 +55,12 @@ struct MotionFit {
   double clock_m{0};                                          ///< change of the clock difference
   int satellites{0};                                          ///< that agree
   double rms_m{0};                                            ///< of what agrees
+};
+
+/// What is known of the error of the predicted displacement before any phase is looked at.
+struct MotionPrior {
+  Eigen::Vector3d mean_e_m{Eigen::Vector3d::Zero()};              ///< m
+  Eigen::Matrix3d covariance_e_m2{Eigen::Matrix3d::Identity()};  ///< P, positive definite
 };
 
 namespace detail {
@@ -119,10 +131,11 @@ struct MotionEquations {
   return set;
 }
 
-/// Verdict on a residual that is free of the signal's own vote.
-[[nodiscard]] inline CheckResult verdict(double residual_m, const PhaseChange& c) {
-  if (!(std::abs(residual_m) < c.threshold_m)) return CheckResult::failed;
-  return c.threshold_m <= 0.45 * c.wavelength_m ? CheckResult::passed : CheckResult::unavailable;
+/// Verdict on a residual that is free of the signal's own vote, its threshold at least `least_m`.
+[[nodiscard]] inline CheckResult verdict(double residual_m, const PhaseChange& c, double least_m = 0) {
+  const double threshold_m = std::max(c.threshold_m, least_m);
+  if (!(std::abs(residual_m) < threshold_m)) return CheckResult::failed;
+  return threshold_m <= 0.45 * c.wavelength_m ? CheckResult::passed : CheckResult::unavailable;
 }
 
 /// Best [d; c] among at most 128 sets of four satellites; `first[k]`: first change of satellite k. False when no set is solvable.
@@ -151,31 +164,28 @@ template <std::size_t N>
   return least <= static_cast<double>(changes.size());
 }
 
-}  // namespace detail
-
-/// The test of common motion. `changes` sorted by satellite; `results` gets one outcome each. At least five satellites, and at least 60 %
-/// of all, must agree, else nothing is said.
+/// Where each satellite begins in `changes`, which are sorted by satellite.
 template <std::size_t N>
-MotionFit common_motion_check(const StaticVector<PhaseChange, N>& changes, StaticVector<CheckResult, N>& results) {
-  constexpr std::size_t min_satellites = 5;
-  constexpr double least_redundancy = 0.2;  // 1 - leverage: below it the others do not predict the satellite
-  MotionFit fit;
-  results.clear();
-  results.resize(changes.size());
-  StaticVector<std::uint16_t, N> first;
+void satellites_of(const StaticVector<PhaseChange, N>& changes, StaticVector<std::uint16_t, N>& first) {
   for (std::size_t i = 0; i < changes.size(); ++i)
     if (i == 0 || changes[i].satellite != changes[i - 1].satellite) first.push_back(static_cast<std::uint16_t>(i));
-  detail::Row4 x;
-  if (first.size() < min_satellites || !detail::motion_by_consensus(changes, first, x)) return fit;
+}
 
+/// Least squares from x over what agrees, until the set stays; then the verdicts. `known`: equations that take part from the beginning (a prior). At least
+/// min_satellites, and at least 60 % of all, must agree. s_m: sigma of a change where a prior takes part, else 0.
+template <std::size_t N>
+MotionFit fit_and_judge(const StaticVector<PhaseChange, N>& changes, const StaticVector<std::uint16_t, N>& first, Row4 x, const MotionEquations& known,
+                        int min_satellites, double s_m, StaticVector<CheckResult, N>& results) {
+  constexpr double least_redundancy = 0.2;  // 1 - leverage: below it the others do not predict the satellite
+  MotionFit fit;
   StaticVector<std::uint8_t, N> votes;
   votes.resize(changes.size());
   Eigen::Matrix4d normal_inverse = Eigen::Matrix4d::Zero();
-  for (int iteration = 0; iteration < 8; ++iteration) {  // least squares over what agrees, until the set stays
-    detail::MotionEquations agreeing;
+  for (int iteration = 0; iteration < 8; ++iteration) {
+    MotionEquations agreeing = known;
     bool changed = iteration == 0;
     for (std::size_t i = 0; i < changes.size(); ++i) {
-      const std::uint8_t vote = std::abs(detail::motion_residual_m(changes[i], x)) < changes[i].threshold_m ? 1 : 0;
+      const std::uint8_t vote = std::abs(motion_residual_m(changes[i], x)) < changes[i].threshold_m ? 1 : 0;
       changed = changed || vote != votes[i];
       votes[i] = vote;
       if (vote) agreeing.add(changes[i]);
@@ -189,19 +199,19 @@ MotionFit common_motion_check(const StaticVector<PhaseChange, N>& changes, Stati
     for (std::size_t i = first[k]; i < end; ++i) any = any || votes[i] != 0;
     fit.satellites += any ? 1 : 0;
   }
-  if (fit.satellites < static_cast<int>(min_satellites) || 10 * fit.satellites < 6 * static_cast<int>(first.size())) return fit;
+  if (fit.satellites < min_satellites || 10 * fit.satellites < 6 * static_cast<int>(first.size())) return fit;
 
   double sum = 0, count = 0;
   for (std::size_t k = 0; k < first.size(); ++k) {
     const std::size_t begin = first[k], end = k + 1 < first.size() ? first[k + 1] : changes.size();
     double voters = 0;
     for (std::size_t i = begin; i < end; ++i) voters += votes[i];
-    const detail::Row4 a{changes[begin].direction_e.x(), changes[begin].direction_e.y(), changes[begin].direction_e.z(), 1.0};
+    const Row4 a{changes[begin].direction_e.x(), changes[begin].direction_e.y(), changes[begin].direction_e.z(), 1.0};
     const double redundancy = 1 - voters * a.dot(normal_inverse * a);
     for (std::size_t i = begin; i < end; ++i) {
-      const double r = detail::motion_residual_m(changes[i], x);
+      const double r = motion_residual_m(changes[i], x);
       if (votes[i]) sum += r * r, count += 1;
-      if (redundancy > least_redundancy) results[i] = detail::verdict(r / redundancy, changes[i]);
+      if (redundancy > least_redundancy) results[i] = verdict(r / redundancy, changes[i], 3 * s_m / std::sqrt(redundancy));
     }
   }
   fit.valid = true;
@@ -209,6 +219,73 @@ MotionFit common_motion_check(const StaticVector<PhaseChange, N>& changes, Stati
   fit.clock_m = x(3);
   fit.rms_m = std::sqrt(sum / count);
   return fit;
+}
+
+/// The equations of a prior, in units of a change's sigma s_m; `inverse`: of its covariance.
+[[nodiscard]] inline MotionEquations prior_equations(const MotionPrior& prior, const Eigen::Matrix3d& inverse, double s_m) {
+  MotionEquations known;
+  const Eigen::Matrix3d information = s_m * s_m * inverse;
+  known.normal.topLeftCorner<3, 3>() = information;
+  known.right.head<3>() = information * prior.mean_e_m;
+  return known;
+}
+
+/// Best [d; c] among those that begin at the prior and the clock of one satellite; false when none is solvable.
+template <std::size_t N>
+[[nodiscard]] bool motion_by_prior(const StaticVector<PhaseChange, N>& changes, const StaticVector<std::uint16_t, N>& first, const MotionPrior& prior,
+                                   const MotionEquations& known, Row4& best) {
+  double least = static_cast<double>(changes.size()) + 1;
+  for (const std::uint16_t k : first) {
+    MotionEquations near = known;
+    for (const PhaseChange& c : changes) {  // within the threshold and three sigmas of what the prior leaves open between the two
+      const Eigen::Vector3d between = c.direction_e - changes[k].direction_e;
+      const double off_m = c.change_m - changes[k].change_m - between.dot(prior.mean_e_m);
+      if (std::abs(off_m) < c.threshold_m + 3 * std::sqrt(between.dot(prior.covariance_e_m2 * between))) near.add(c);
+    }
+    Row4 x;
+    Eigen::Matrix4d unused;
+    if (!near.solve(x, unused)) continue;
+    double cost = 0;
+    for (const PhaseChange& c : changes) {
+      const double z = motion_residual_m(c, x) / c.threshold_m;
+      cost += std::min(z * z, 1.0);
+    }
+    if (cost < least) least = cost, best = x;
+  }
+  return least <= static_cast<double>(changes.size());
+}
+
+}  // namespace detail
+
+/// The test of common motion. `changes` sorted by satellite; `results` gets one outcome each. At least five satellites, and at least 60 %
+/// of all, must agree, else nothing is said.
+template <std::size_t N>
+MotionFit common_motion_check(const StaticVector<PhaseChange, N>& changes, StaticVector<CheckResult, N>& results) {
+  constexpr int min_satellites = 5;
+  results.clear();
+  results.resize(changes.size());
+  StaticVector<std::uint16_t, N> first;
+  detail::satellites_of(changes, first);
+  detail::Row4 x;
+  if (first.size() < min_satellites || !detail::motion_by_consensus(changes, first, x)) return {};
+  return detail::fit_and_judge(changes, first, x, {}, min_satellites, 0, results);
+}
+
+/// The same where the motion is predicted: at least two satellites, and 60 % of all, must agree. Nothing is said where the prior is not positive definite.
+template <std::size_t N>
+MotionFit predicted_motion_check(const StaticVector<PhaseChange, N>& changes, const MotionPrior& prior, StaticVector<CheckResult, N>& results) {
+  constexpr int min_satellites = 2;
+  results.clear();
+  results.resize(changes.size());
+  StaticVector<std::uint16_t, N> first;
+  detail::satellites_of(changes, first);
+  const math::SmallCholesky<3> covariance(prior.covariance_e_m2);
+  if (first.size() < min_satellites || !covariance.ok()) return {};
+  const double s_m = changes[0].threshold_m / 7;
+  const detail::MotionEquations known = detail::prior_equations(prior, covariance.inverse(), s_m);
+  detail::Row4 x;
+  if (!detail::motion_by_prior(changes, first, prior, known, x)) return {};
+  return detail::fit_and_judge(changes, first, x, known, min_satellites, s_m, results);
 }
 
 /// The test of common change, for those that have no outcome yet (`unavailable`): a signal passes when it agrees, within the larger

@@ -75,6 +75,7 @@ struct CycleSlipOptions {
   bool common_motion{true};
   double common_motion_m{0.07};
   double common_motion_rate_mps{0.0005};       ///< likewise
+  bool predicted_motion{false};                ///< common motion about a predicted displacement, where one is given and satellites alone say nothing
   double base_age_rate_mps{0.0015};            ///< added for every second by which the age of the base data changed: satellite clocks
   bool doppler{true};                          ///< where common motion gave no verdict
   double doppler_m{0.045}, doppler_mps{0.04};  ///< threshold doppler_m + doppler_mps dt: noise of the Doppler and jerk

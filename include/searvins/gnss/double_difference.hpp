@@ -22,6 +22,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include <searvins/core/static_vector.hpp>
 #include <searvins/core/status.hpp>
@@ -61,12 +62,15 @@ class Differencer {
   /// Differences one rover epoch. `predicted_rover_e_m`: antenna position, good to some ten metres. The outcome does not depend on the
   /// order of satellites and signals in the epochs.
   ///
+  /// `moved`: since the epoch that is remembered (the last one with base data), where inertial readings tell.
+  ///
   /// Without usable base data the call succeeds, `out.base_status` says why there are no single differences, and the memory stays (the same
   /// epoch may be offered again). Errors, with `out` empty and the memory as it was: non_finite or invalid_argument (position), duplicate
   /// or out_of_order (tag not after the previous one).
   template <std::size_t B, std::size_t E>
   Status difference(const ObservationEpoch& rover, const BaseBuffer<B>& base, const EphemerisStore<E>& store,
-                    const Eigen::Vector3d& predicted_rover_e_m, const DifferencingOptions& options, DifferencedEpoch& out) {
+                    const Eigen::Vector3d& predicted_rover_e_m, const DifferencingOptions& options, DifferencedEpoch& out,
+                    const std::optional<PredictedDisplacement>& moved = {}) {
     out = DifferencedEpoch{};
     out.rover_tag = rover.tag;
     if (const Status s = check(rover, predicted_rover_e_m); !s) return s;
@@ -96,7 +100,7 @@ class Differencer {
     pick_doppler_pivot(out);
     if (!match) return ok_status();
 
-    const PhaseEpoch epoch{rover.tag, rover.power_failure, match->age_s, base.position_revision()};
+    const PhaseEpoch epoch{rover.tag, rover.power_failure, match->age_s, base.position_revision(), predicted_rover_e_m, moved};
     out.motion = continuity_.compare(epoch, samples_, options.slips, verdicts_);
     for (std::size_t i = 0; i < signals_.size(); ++i)
       signals_[i].continuity = verdicts_[i].continuity, signals_[i].cause = verdicts_[i].cause;

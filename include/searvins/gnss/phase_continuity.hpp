@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include <searvins/core/static_vector.hpp>
@@ -41,12 +42,20 @@ struct PhaseSample {
   bool half_cycle{false};    ///< of the rover
 };
 
+/// How far the antenna has moved since the previous epoch, from inertial readings.
+struct PredictedDisplacement {
+  Eigen::Vector3d displacement_e_m{Eigen::Vector3d::Zero()};
+  Eigen::Matrix3d covariance_e_m2{Eigen::Matrix3d::Identity()};
+};
+
 /// What the comparison needs of the epoch as a whole.
 struct PhaseEpoch {
   GpsTime tag{};
   bool power_failure{false};
   double base_age_s{0};
   std::uint32_t base_revision{0};  ///< counts the positions of the base
+  Eigen::Vector3d position_e_m{Eigen::Vector3d::Zero()};  ///< predicted, where the ranges were computed
+  std::optional<PredictedDisplacement> moved{};           ///< since the remembered epoch
 };
 
 /// Continuity of up to N phases from epoch to epoch.
@@ -76,6 +85,11 @@ class PhaseContinuity {
       collect(samples, phase_change_m_,
               options.common_motion_m + options.common_motion_rate_mps * extra_s + options.base_age_rate_mps * age_change_s);
       fit = common_motion_check(changes_, results_);
+      if (!fit.valid && options.predicted_motion && epoch.moved && started_) {
+        // The changes are less those between the two predicted positions; what is left of the displacement is the prior's mean.
+        const Eigen::Vector3d taken_out_m = epoch.position_e_m - epoch_.position_e_m;
+        fit = predicted_motion_check(changes_, {epoch.moved->displacement_e_m - taken_out_m, epoch.moved->covariance_e_m2}, results_);
+      }
       for (std::size_t i = 0; i < changes_.size(); ++i) evidence_[origin_[i]].common_motion = results_[i];
     }
     if (options.doppler) check_doppler(samples, options.doppler_m + options.doppler_mps * dt_s);
