@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // P12 every settings field of the inertial estimator changes some output of a drive that has something for each of them; and none of its steps allocates.
 #include <algorithm>
-#include <atomic>
 #include <vector>
 
 #include "estimator/inertial_drive.hpp"
-
-namespace searvins::test {
-inline std::atomic<unsigned long long> allocation_count{
-    0};  // that of support/allocation_counter.hpp, which one file of an executable may include
-}
+#include "support/allocation_count.hpp"
 
 using namespace searvins;
 using namespace searvins::test;
@@ -189,17 +184,17 @@ TEST_CASE("a minute of readings and epochs, GNSS alone, aligned, bridged and ali
   cut(all, d, Stream::rover, 40.5, 45.5);
   cut(all, d, Stream::imu, 50, 52);
   InertialUnderTest e = estimator_for(d, few_signals(d));
-  const auto alive = allocation_count.load();
+  const auto alive = heap_allocations();
   CHECK(std::vector<double>(100, 1.0).size() == 100);
-  CHECK(allocation_count.load() > alive);  // the counter counts
-  const auto before = allocation_count.load();
+  CHECK(heap_allocations() > alive);  // the counter counts
+  const auto before = heap_allocations();
   int solutions = 0, aligned = 0;
   for (const Arrival& a : all) {
     (void)hand_over(e, d, a);
     for (auto s = e.next(); s.ok(); s = e.next()) ++solutions, aligned += s->has_attitude ? 1 : 0;
     (void)e.predict(a.at);
   }
-  const auto allocations = allocation_count.load() - before;
+  const auto allocations = heap_allocations() - before;
   CHECK(allocations == 0);
   CHECK(solutions >= 59);
   CHECK(aligned > 20);

@@ -48,12 +48,12 @@ std::vector<double> outputs(const Drive& d, const RtkOptions& options) {
   return all;
 }
 
-struct Flip {
+struct RtkFlip {
   const char* name;
   void (*change)(RtkOptions&);
 };
 
-const Flip kFlips[] = {
+const RtkFlip kRtkFlips[] = {
     {"continuity", [](RtkOptions& o) { o.continuity = ambiguity::ContinuityMode::instantaneous; }},
     {"arc_epochs", [](RtkOptions& o) { o.arc_epochs = 5; }},
     {"walk_sigma_cycles", [](RtkOptions& o) { o.walk_sigma_cycles = 0.01; }},
@@ -126,7 +126,7 @@ TEST_CASE("P12 every settings field changes some output") {
   const Drive d = eventful_drive();
   const std::vector<double> reference = outputs(d, {});
   CHECK(reference == outputs(d, {}));
-  for (const Flip& flip : kFlips) {
+  for (const RtkFlip& flip : kRtkFlips) {
     RtkOptions options;
     flip.change(options);
     const std::string name = flip.name;

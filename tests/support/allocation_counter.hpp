@@ -7,9 +7,10 @@
 /// is the one that settles the claim.
 #pragma once
 
-#include <atomic>
 #include <cstdlib>
 #include <new>
+
+#include "support/allocation_count.hpp"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define SEARVINS_COUNT_MALLOC 0
@@ -25,9 +26,6 @@
 #endif
 
 namespace searvins::test {
-inline std::atomic<unsigned long long> allocation_count{0};
-/// Allocations so far in this process.
-[[nodiscard]] inline unsigned long long heap_allocations() { return allocation_count.load(); }
 /// Whether malloc itself is counted, not only operator new.
 inline constexpr bool counts_malloc = SEARVINS_COUNT_MALLOC != 0;
 }  // namespace searvins::test
