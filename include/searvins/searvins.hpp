@@ -80,6 +80,7 @@
 #include <searvins/imu/preintegration.hpp>
 
 #include <searvins/math/block_cholesky.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/math/quantiles.hpp>
 #include <searvins/math/small_cholesky.hpp>
 #include <searvins/math/so3.hpp>
