@@ -47,7 +47,7 @@ solve_drive() {
     solve_one "stereo_$run" "${unit[@]}" --tracks "$drive/stereo_tracks.csv" --robust "$run"
   done
   echo "solve: waiting for the run from pictures"
-  wait "$from_pictures" || { cat "$runs/stereo_from_pictures.progress" >&2 && return 1; }
+  wait "$from_pictures" || { cat "$runs/stereo_from_pictures.progress" >&2; return 1; }
   echo "The rows of the paper in the tables are of its own drive, 20 km of downtown streets: for scale, not for comparison."
   "$searvins" evaluate --truth "$drive/truth.csv" --start 274800 --end 274860 --paper --streets "$drive/streets.csv" --report "$out/drive.html" \
     "GNSS=$runs/GNSS" "GNSS+IMU=$runs/GNSS+IMU" "stereo scalar=$runs/stereo_scalar" "stereo latent=$runs/stereo_latent" \

@@ -70,13 +70,15 @@ int run_demo(int argc, const char* const* argv) {
       runs.push_back({formulation, *outcome->evaluation});
   }
   if (runs.empty())
-    return unusable_input("demo", {request.truth, 0, "no epoch of the recording can be scored against it", "check that both are of the same day"});
+    return unusable_input("demo",
+                          {request.truth, 0, "no epoch of the recording can be scored against it", "check that both are of the same day"});
   std::fputs(evaluation_text(runs).c_str(), stdout);
 
   std::error_code failed;
   fs::copy_file(out / best / "report.html", out / "report.html", fs::copy_options::overwrite_existing, failed);
   if (failed)
-    return unusable_input("demo", {(out / "report.html").string(), 0, "could not be written: " + failed.message(), "choose another folder with --out"});
+    return unusable_input(
+        "demo", {(out / "report.html").string(), 0, "could not be written: " + failed.message(), "choose another folder with --out"});
   std::printf("\nThe recording is synthetic and GNSS only. Report of the best run (%s): %s\n", best.c_str(),
               (out / "report.html").string().c_str());
   return all_solved ? kExitDone : kExitDegraded;

@@ -154,7 +154,8 @@ int run_evaluate(int argc, const char* const* argv) {
   std::fputs((paper_table_text(table) + '\n' + assessment_text(runs)).c_str(), stdout);
   std::string command = "searvins evaluate";
   for (int i = 1; i < argc; ++i) (command += ' ') += argv[i];
-  if (const io::Diagnostic wrong = write_files(options, table, std::move(runs), command); !wrong.message.empty()) return unusable_input("evaluate", wrong);
+  if (const io::Diagnostic wrong = write_files(options, table, std::move(runs), command); !wrong.message.empty())
+    return unusable_input("evaluate", wrong);
   return kExitDone;
 }
 

@@ -205,8 +205,8 @@ int run_simulate(int argc, const char* const* argv) {
   if (options.given("nav")) {
     wanted.orbits = orbits_of(records, wanted);
     if (wanted.orbits.size() < 8)
-      return unusable_input("simulate", 
-          {options.text("nav"), 0, "fewer than eight satellites have a record within two hours of the drive", "give the day's file"});
+      return unusable_input(
+          "simulate", {options.text("nav"), 0, "fewer than eight satellites have a record within two hours of the drive", "give the day's file"});
   }
 
   const std::filesystem::path folder{options.text("out")};

@@ -168,7 +168,8 @@ TEST_CASE("P12 every settings field of the inertial estimator changes some outpu
   check_flips(e, floating, kAnchors);
   Eventful few;  // four satellites of one frequency, and no Doppler shift to tell how they moved
   for (gnss::ObservationEpoch& epoch : few.drive.rover)
-    if (few.drive.seconds(epoch.tag) > 46 && few.drive.seconds(epoch.tag) < 60) epoch.satellites.resize(std::min<std::size_t>(epoch.satellites.size(), 4));
+    if (few.drive.seconds(epoch.tag) > 46 && few.drive.seconds(epoch.tag) < 60)
+      epoch.satellites.resize(std::min<std::size_t>(epoch.satellites.size(), 4));
   EstimatorOptions blind = options;
   blind.rtk.differencing.slips.doppler = false;
   check_flips(few, blind, kPredictedMotion);

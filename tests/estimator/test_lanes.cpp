@@ -26,12 +26,13 @@ struct Silent {
 };
 
 int in_lane(const Run& run) {
-  return static_cast<int>(std::count_if(run.solutions.begin(), run.solutions.end(), [](const estimator::RtkSolution& s) { return s.in_lane; }));
+  return static_cast<int>(
+      std::count_if(run.solutions.begin(), run.solutions.end(), [](const estimator::RtkSolution& s) { return s.in_lane; }));
 }
 
 }  // namespace
 
-TEST_CASE("lanes hold a drive without a rover, and only there: less error across the lane over six drives, covariances that keep up") {
+TEST_CASE("lanes hold a drive without a rover, and only there: less horizontal error over six drives, covariances that keep up") {
   double squares_with_m2 = 0, squares_without_m2 = 0, nees = 0;
   int n = 0, held = 0;
   for (std::uint64_t seed = 31; seed < 37; ++seed) {
@@ -42,9 +43,10 @@ TEST_CASE("lanes hold a drive without a rover, and only there: less error across
     CHECK(in_lane(without) == 0);
     for (const estimator::RtkSolution& x : with.solutions)
       if (x.in_lane) CHECK(x.held_integers == 0);
-    const DriveScore a = score_of(s.drive, without, kSilentFromS + 1, kSilentToS - 1), b = score_of(s.drive, with, kSilentFromS + 1, kSilentToS - 1);
-    MESSAGE("seed " << seed << ": RMS " << a.rms_m() << " -> " << b.rms_m() << " m, max " << a.max_m << " -> " << b.max_m << ", NEES " << a.mean_nees()
-                    << " -> " << b.mean_nees() << ", held " << in_lane(with));
+    const DriveScore a = score_of(s.drive, without, kSilentFromS + 1, kSilentToS - 1),
+                     b = score_of(s.drive, with, kSilentFromS + 1, kSilentToS - 1);
+    MESSAGE("seed " << seed << ": RMS " << a.rms_m() << " -> " << b.rms_m() << " m, max " << a.max_m << " -> " << b.max_m << ", NEES "
+                    << a.mean_nees() << " -> " << b.mean_nees() << ", held " << in_lane(with));
     squares_without_m2 += a.squares_m2, squares_with_m2 += b.squares_m2, nees += b.nees, n += b.solutions, held += in_lane(with);
   }
   CHECK(held > 20);

@@ -30,6 +30,7 @@
 #include "examples/datasets/sensor_yaml.hpp"
 #include "examples/support/angle_units.hpp"
 #include "simulated_files.hpp"
+#include "support/temporary_folder.hpp"
 
 using namespace searvins;
 using namespace searvins::examples;
@@ -40,27 +41,17 @@ namespace {
 
 using searvins::examples::kDegPerRad;
 
-/// A folder that goes with the test.
-class LayoutFolder {
+/// The files of a recording, to be read and spoilt.
+class LayoutFolder : public test::TemporaryFolder {
  public:
-  explicit LayoutFolder(const std::string& name) : path_(fs::temp_directory_path() / ("searvins_layout_" + name)) {
-    fs::remove_all(path_);
-    fs::create_directories(path_);
-  }
-  ~LayoutFolder() { fs::remove_all(path_); }
-  LayoutFolder(const LayoutFolder&) = delete;
-  LayoutFolder& operator=(const LayoutFolder&) = delete;
-  [[nodiscard]] const fs::path& path() const { return path_; }
+  explicit LayoutFolder(const std::string& name) : TemporaryFolder("layout_" + name) {}
   void write(const std::string& name, const std::string& text) const {
-    fs::create_directories((path_ / name).parent_path());
-    REQUIRE(io::write_text_file((path_ / name).string(), text).empty());
+    fs::create_directories((path() / name).parent_path());
+    REQUIRE(io::write_text_file((path() / name).string(), text).empty());
   }
-  [[nodiscard]] std::string read(const std::string& name) const { return *io::read_text_file((path_ / name).string()); }
+  [[nodiscard]] std::string read(const std::string& name) const { return *io::read_text_file((path() / name).string()); }
   /// Applies a change to a file's text.
   void change(const std::string& name, const std::function<std::string(std::string)>& how) const { write(name, how(read(name))); }
-
- private:
-  fs::path path_;
 };
 
 constexpr double kDrive_s = 24;

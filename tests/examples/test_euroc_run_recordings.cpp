@@ -15,6 +15,7 @@
 #include <searvins/geodesy/local_frame.hpp>
 
 #include "support/shared_data.hpp"
+#include "support/temporary_folder.hpp"
 #include "tests/examples/command_runner.hpp"
 
 #ifdef SEARVINS_COMMAND
@@ -22,28 +23,10 @@
 using namespace searvins;
 using searvins::test::has;
 using searvins::test::Outcome;
+using searvins::test::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {
-
-/// A folder of its own for a test, away again at its end.
-class RunFolder {
- public:
-  explicit RunFolder(const char* name) : path_(fs::temp_directory_path() / name) {
-    fs::remove_all(path_);
-    fs::create_directories(path_);
-  }
-  ~RunFolder() {
-    std::error_code failed;
-    fs::remove_all(path_, failed);
-  }
-  RunFolder(const RunFolder&) = delete;
-  RunFolder& operator=(const RunFolder&) = delete;
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 std::string text_of(const fs::path& path) {
   std::ifstream stream{path, std::ios::binary};
@@ -101,7 +84,7 @@ TEST_CASE("euroc run: real pictures of a craft at rest: a pose for each frame fr
     return;
   }
   const fs::path recording = *shared / "data/real/euroc_v101_static";
-  const RunFolder out("searvins_euroc_rest");
+  const TemporaryFolder out("euroc_rest");
   const Outcome run = test::run("solve --dataset euroc '" + recording.string() + "' --out '" + out.path().string() + "'");
   INFO(run.output);
   REQUIRE(run.exit_code == 0);
@@ -128,7 +111,7 @@ TEST_CASE("euroc run: real pictures of a craft at rest: a pose for each frame fr
 }
 
 TEST_CASE("euroc run: a rendered drive is followed to a per cent of its way, from the first frame on") {
-  const RunFolder data("searvins_euroc_drive"), out("searvins_euroc_drive_out");
+  const TemporaryFolder data("euroc_drive"), out("euroc_drive_out");
   write_route(data.path() / "route.csv", 12);
   const Outcome made = test::run("simulate --profile urban --route '" + (data.path() / "route.csv").string() +
                                  "' --duration 12 --images 480x180 --out '" + data.path().string() + "'");

@@ -11,6 +11,7 @@
 #include "examples/support/evaluation.hpp"
 #include "examples/support/evaluation_tables.hpp"
 #include "examples/support/load_trajectory.hpp"
+#include "scored_run.hpp"
 #include "support/property.hpp"
 #include "support/shared_data.hpp"
 
@@ -19,12 +20,12 @@ using namespace searvins::examples;
 using searvins::io::SolutionStatus;
 using searvins::io::TrajectoryRow;
 using searvins::test::for_all_seeds;
+using searvins::test::kStart;
 using searvins::test::Rng;
 using searvins::test::uniform;
 
 namespace {
 
-const GpsTime kDriveStart = GpsTime::from_week_sow(2323, 553980);
 
 /// A straight drive at constant ECEF velocity, one truth row a second, and the same as an estimate.
 struct Drive {
@@ -37,7 +38,7 @@ Drive straight_drive(Rng& rng, int n, SolutionStatus status = SolutionStatus::fi
   const Eigen::Vector3d p0{-3810234.401, 3567867.762, 3652897.917}, v_mps = test::random_vector<3>(rng, 15);
   for (int i = 0; i < n; ++i) {
     TrajectoryRow row;
-    row.time = kDriveStart.plus_seconds(i);
+    row.time = kStart.plus_seconds(i);
     row.p_e_m = p0 + i * v_mps;
     row.status = status;
     drive.truth.points.push_back({row.time, row.p_e_m});

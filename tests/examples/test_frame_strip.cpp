@@ -21,6 +21,7 @@
 #include "examples/support/png_writer.hpp"
 #include "examples/support/report.hpp"
 #include "examples/support/report_strip.hpp"
+#include "scored_run.hpp"
 #include "support/property.hpp"
 
 using namespace searvins;
@@ -28,6 +29,7 @@ using namespace searvins::examples;
 using searvins::test::chance;
 using searvins::test::for_all_seeds;
 using searvins::test::integer;
+using searvins::test::kStart;
 using searvins::test::Rng;
 using vision::FrameFate;
 using vision::ObservationFate;
@@ -35,7 +37,6 @@ using Frame = vision::StereoFrame<64>;
 
 namespace {
 
-const GpsTime kStripStart = GpsTime::from_week_sow(2323, 553980);
 
 vision::StereoObservation at(std::uint64_t track, double u_px, double v_px, double disparity_px = 0) {
   vision::StereoObservation o;
@@ -56,9 +57,9 @@ void judge_one(FrameStrip& strip, GpsTime t, ObservationFate fate) { strip.judge
 /// The picture of one observation at (80, 40) in a grey image of 120 x 90, of a track seen in `age` frames.
 StripPicture picture_of(const ObservationFate* fate, int age = 1, double disparity_px = 0) {
   const GrayImage image(120, 90, 100);
-  FrameStrip strip{kStripStart, kStripStart.plus_seconds(100), {1, 960, 0.5}};
-  for (int k = 0; k < age; ++k) offer_one(strip, kStripStart.plus_seconds(k), image, at(7, 80, 40, disparity_px));
-  if (fate) judge_one(strip, kStripStart.plus_seconds(age - 1), *fate);
+  FrameStrip strip{kStart, kStart.plus_seconds(100), {1, 960, 0.5}};
+  for (int k = 0; k < age; ++k) offer_one(strip, kStart.plus_seconds(k), image, at(7, 80, 40, disparity_px));
+  if (fate) judge_one(strip, kStart.plus_seconds(age - 1), *fate);
   const std::vector<StripPicture> pictures = strip.pictures();
   REQUIRE(pictures.size() == 1);
   return pictures.front();
@@ -167,9 +168,9 @@ TEST_CASE("Frames are kept evenly over the run: the first of every stretch, when
     const GrayImage image(32, 24, 50);
     const int wanted = integer(rng, 1, 9), frames = integer(rng, 20, 200);
     const double step_s = 0.1, whole_s = step_s * frames;
-    FrameStrip strip{kStripStart, kStripStart.plus_seconds(whole_s), {wanted, 960, 1.0}};
+    FrameStrip strip{kStart, kStart.plus_seconds(whole_s), {wanted, 960, 1.0}};
     const int late = integer(rng, 0, 4);  // frames by which judgements come later
-    const auto time = [&](int k) { return kStripStart.plus_seconds(step_s * k); };
+    const auto time = [&](int k) { return kStart.plus_seconds(step_s * k); };
     for (int k = 0; k < frames + late; ++k) {
       if (k < frames) offer_one(strip, time(k), image, at(1, 10, 10));
       if (k >= late) judge_one(strip, time(k - late), ObservationFate::maturing);
@@ -177,7 +178,7 @@ TEST_CASE("Frames are kept evenly over the run: the first of every stretch, when
     const std::vector<StripPicture> pictures = strip.pictures();
     REQUIRE(pictures.size() == static_cast<std::size_t>(wanted));
     for (std::size_t i = 0; i < pictures.size(); ++i) {
-      const double begin_s = whole_s * static_cast<double>(i) / wanted, after_s = seconds_between(kStripStart, pictures[i].time) - begin_s;
+      const double begin_s = whole_s * static_cast<double>(i) / wanted, after_s = seconds_between(kStart, pictures[i].time) - begin_s;
       CHECK(after_s > -1e-6);
       CHECK(after_s < step_s + 1e-6);
       CHECK(pictures[i].fate == FrameFate::full);
@@ -188,18 +189,18 @@ TEST_CASE("Frames are kept evenly over the run: the first of every stretch, when
 
 TEST_CASE("A picture that is not judged gives way to a later one of its stretch; the last one stays, unscreened") {
   const GrayImage image(32, 24, 50);
-  FrameStrip strip{kStripStart, kStripStart.plus_seconds(20), {2, 960, 1.0}};
+  FrameStrip strip{kStart, kStart.plus_seconds(20), {2, 960, 1.0}};
   for (int k = 0; k < 200; ++k) {
-    const GpsTime t = kStripStart.plus_seconds(0.1 * k);
+    const GpsTime t = kStart.plus_seconds(0.1 * k);
     offer_one(strip, t, image, at(1, 10, 10));
     if (k >= 55 && k < 100) judge_one(strip, t, ObservationFate::maturing);
   }
   const std::vector<StripPicture> pictures = strip.pictures();
   REQUIRE(pictures.size() == 2);
   CHECK(pictures[0].fate == FrameFate::full);  // from 5.5 s on frames are screened
-  CHECK(seconds_between(kStripStart, pictures[0].time) < 7);
+  CHECK(seconds_between(kStart, pictures[0].time) < 7);
   CHECK_FALSE(pictures[1].fate);
-  CHECK(seconds_between(kStripStart, pictures[1].time) > 18.9);
+  CHECK(seconds_between(kStart, pictures[1].time) > 18.9);
   CHECK(pictures[1].unscreened == 1);
   CHECK(pictures[1].offered() == 1);
   CHECK(pictures[1].image(10, 10) == kUnscreenedColour);
@@ -207,12 +208,12 @@ TEST_CASE("A picture that is not judged gives way to a later one of its stretch;
 
 TEST_CASE("Only the first judgement of a frame counts, and only that of a frame that is kept") {
   const GrayImage image(32, 24, 50);
-  FrameStrip strip{kStripStart, kStripStart.plus_seconds(10), {1, 960, 100}};
-  offer_one(strip, kStripStart, image, at(1, 10, 10));
-  judge_one(strip, kStripStart.plus_seconds(1), ObservationFate::too_far);
+  FrameStrip strip{kStart, kStart.plus_seconds(10), {1, 960, 100}};
+  offer_one(strip, kStart, image, at(1, 10, 10));
+  judge_one(strip, kStart.plus_seconds(1), ObservationFate::too_far);
   CHECK_FALSE(strip.pictures().front().fate);
-  judge_one(strip, kStripStart, ObservationFate::low_score);
-  judge_one(strip, kStripStart, ObservationFate::too_far);
+  judge_one(strip, kStart, ObservationFate::low_score);
+  judge_one(strip, kStart, ObservationFate::too_far);
   CHECK(strip.pictures().front().counts[static_cast<std::size_t>(ObservationFate::low_score)] == 1);
   CHECK(strip.pictures().front().offered() == 1);
 }
@@ -257,9 +258,9 @@ TEST_CASE("Colours: no two reasons look alike, nor like an age") {
 
 TEST_CASE("Wide images become smaller by a whole factor, and the marks with them") {
   const GrayImage image(2048, 732, 120);
-  FrameStrip strip{kStripStart, kStripStart.plus_seconds(1)};
-  offer_one(strip, kStripStart, image, at(1, 1501, 301, 60));
-  judge_one(strip, kStripStart, ObservationFate::low_score);
+  FrameStrip strip{kStart, kStart.plus_seconds(1)};
+  offer_one(strip, kStart, image, at(1, 1501, 301, 60));
+  judge_one(strip, kStart, ObservationFate::low_score);
   const StripPicture picture = strip.pictures().front();
   CHECK(picture.image.width() == 682);
   CHECK(picture.image.height() == 244);
@@ -274,17 +275,17 @@ TEST_CASE("Bad input: no image, no stretch, numbers that are none, more or fewer
   frame.add(at(4, 5, 5, -8)), frame.dropped = 2;
   const std::vector<ObservationFate> fates(20, ObservationFate::admitted);
 
-  FrameStrip none{kStripStart, kStripStart.plus_seconds(1), {0}};
-  none.offer(kStripStart, image.view(), frame);
+  FrameStrip none{kStart, kStart.plus_seconds(1), {0}};
+  none.offer(kStart, image.view(), frame);
   CHECK(none.pictures().empty());
-  FrameStrip blind{kStripStart, kStripStart.plus_seconds(1)};
-  blind.offer(kStripStart, {}, frame);
-  blind.judge(kStripStart, fates, FrameFate::full);
+  FrameStrip blind{kStart, kStart.plus_seconds(1)};
+  blind.offer(kStart, {}, frame);
+  blind.judge(kStart, fates, FrameFate::full);
   CHECK(blind.pictures().empty());
 
-  FrameStrip strip{kStripStart, kStripStart};  // a run without length
-  strip.offer(kStripStart, image.view(), frame);
-  strip.judge(kStripStart, std::span{fates}.first(3), FrameFate::reuse_only);
+  FrameStrip strip{kStart, kStart};  // a run without length
+  strip.offer(kStart, image.view(), frame);
+  strip.judge(kStart, std::span{fates}.first(3), FrameFate::reuse_only);
   REQUIRE(strip.pictures().size() == 1);
   const StripPicture picture = strip.pictures().front();
   CHECK(picture.admitted() == 3);
@@ -292,9 +293,9 @@ TEST_CASE("Bad input: no image, no stretch, numbers that are none, more or fewer
   CHECK(picture.counts[static_cast<std::size_t>(ObservationFate::capacity)] == 2);
   CHECK(picture.offered() == frame.observations.size() + 2);
 
-  FrameStrip all{kStripStart, kStripStart};
-  all.offer(kStripStart, image.view(), frame);
-  all.judge(kStripStart, fates, FrameFate::full);
+  FrameStrip all{kStart, kStart};
+  all.offer(kStart, image.view(), frame);
+  all.judge(kStart, fates, FrameFate::full);
   CHECK(all.pictures().front().admitted() == frame.observations.size());
 }
 
@@ -302,16 +303,16 @@ TEST_CASE("Ages are of frames: a number that occurs twice in a frame was seen on
   const GrayImage image(64, 48, 50);
   const auto admitted = ObservationFate::admitted;
   const auto age_after = [&](int away) {
-    FrameStrip strip{kStripStart, kStripStart.plus_seconds(1000), {1, 960, 0.5}};
+    FrameStrip strip{kStart, kStart.plus_seconds(1000), {1, 960, 0.5}};
     int k = 0;
     for (; k < 5; ++k) {
       Frame frame;
       frame.add(at(9, 40, 20)), frame.add(at(9, 40, 20));
-      strip.offer(kStripStart.plus_seconds(k), image.view(), frame);
+      strip.offer(kStart.plus_seconds(k), image.view(), frame);
     }
-    for (; k < 5 + away; ++k) offer_one(strip, kStripStart.plus_seconds(k), image, at(100 + static_cast<std::uint64_t>(k), 5, 5));
-    offer_one(strip, kStripStart.plus_seconds(k), image, at(9, 40, 20));
-    judge_one(strip, kStripStart.plus_seconds(k), admitted);
+    for (; k < 5 + away; ++k) offer_one(strip, kStart.plus_seconds(k), image, at(100 + static_cast<std::uint64_t>(k), 5, 5));
+    offer_one(strip, kStart.plus_seconds(k), image, at(9, 40, 20));
+    judge_one(strip, kStart.plus_seconds(k), admitted);
     const StripPicture picture = strip.pictures().front();
     for (int age = 1; age < kFullAge; ++age)
       for (int x = 41; x < 48; ++x)
@@ -327,11 +328,11 @@ TEST_CASE("The section has a picture a frame, and a legend of the reasons that o
   for_all_seeds(20, [](Rng& rng) {
     const GrayImage image(48, 32, 80);
     const int wanted = integer(rng, 1, 5);
-    FrameStrip strip{kStripStart, kStripStart.plus_seconds(wanted), {wanted, 960, 10}};
+    FrameStrip strip{kStart, kStart.plus_seconds(wanted), {wanted, 960, 10}};
     std::set<ObservationFate> occurring;
     bool is_unscreened = false;
     for (int k = 0; k < wanted; ++k) {
-      const GpsTime t = kStripStart.plus_seconds(k);
+      const GpsTime t = kStart.plus_seconds(k);
       Frame frame;
       std::vector<ObservationFate> fates;
       for (int i = integer(rng, 1, 6); i > 0; --i) {
@@ -376,7 +377,7 @@ TEST_CASE("The page has the section where there are pictures, with rows or witho
   report.strip.push_back(picture_of(&admitted));
   CHECK(occurrences(report_html(report), "<img ") == 1);
   io::TrajectoryRow row;
-  row.time = kStripStart, row.p_e_m = {-3810234.401, 3567867.762, 3652897.917};
+  row.time = kStart, row.p_e_m = {-3810234.401, 3567867.762, 3652897.917};
   report.rows.push_back(row);
   const std::string html = report_html(report);
   CHECK(occurrences(html, "<img ") == 1);

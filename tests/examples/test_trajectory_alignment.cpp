@@ -173,8 +173,8 @@ TEST_CASE("relative error: blind to any rigid motion, says a scale in percent an
     for (int i = 0; i <= 300; ++i) {
       const double way_m = 0.1 * i;
       truth.push_back({GpsTime{std::int64_t{i} * 100'000'000}, {way_m, 0, 0}, Eigen::Matrix3d::Identity()});
-      estimate.push_back(any *
-                         TimedPose{truth.back().time, {scale * way_m, 0, 0}, so3::exp(Eigen::Vector3d{way_m * drift_deg_m * kRadPerDeg, 0, 0})});
+      estimate.push_back(
+          any * TimedPose{truth.back().time, {scale * way_m, 0, 0}, so3::exp(Eigen::Vector3d{way_m * drift_deg_m * kRadPerDeg, 0, 0})});
     }
     const auto pairs = paired(estimate, truth);
     for (const double length_m : {1.0, 10.0}) {

@@ -18,8 +18,8 @@ using searvins::test::uniform;
 
 namespace {
 
-using std::numbers::pi;
 using searvins::examples::kRadPerDeg;
+using std::numbers::pi;
 const Eigen::Vector3d kBase_e_m{-742080.4125, -5462031.7412, 3198339.6909};
 const Eigen::Vector3d kRover_e_m{-741205.0262, -5462376.8743, 3197933.6654};
 

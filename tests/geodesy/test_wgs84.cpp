@@ -20,8 +20,8 @@ using searvins::test::uniform;
 namespace {
 
 using Real = long double;
-using std::numbers::pi;
 using searvins::examples::kRadPerDeg;
+using std::numbers::pi;
 
 /// The forward transform in long double: truth for the inverse.
 Eigen::Matrix<Real, 3, 1> exact_ecef(const Geodetic& g) {

@@ -108,7 +108,9 @@ TEST_CASE("nothing is said with four satellites, without consensus, or where the
   });
 }
 
-TEST_CASE("a motion that is predicted to a centimetre: two to four satellites verify each other, and one that slipped is named by two or three others") {
+TEST_CASE(
+    "a motion that is predicted to a centimetre: two to four satellites verify each other, and one that slipped is named by two or three "
+    "others") {
   for_all_seeds(200, [](Rng& rng) {
     const int n = integer(rng, 2, 4);
     const double sigma_m = uniform(rng, 0.002, 0.01), c = uniform(rng, -3e5, 3e5);
@@ -127,7 +129,8 @@ TEST_CASE("a motion that is predicted to a centimetre: two to four satellites ve
     changes[bad].change_m += (chance(rng, 0.5) ? 1 : -1) * 0.19 * integer(rng, 1, 9);
     const MotionFit spoilt = predicted_motion_check(changes, prior, results);
     CHECK(spoilt.valid == (n > 2));  // of two that differ nobody knows which it is
-    for (std::size_t i = 0; i < results.size(); ++i) CHECK(results[i] == (n == 2 ? CheckResult::unavailable : i == bad ? CheckResult::failed : CheckResult::passed));
+    for (std::size_t i = 0; i < results.size(); ++i)
+      CHECK(results[i] == (n == 2 ? CheckResult::unavailable : i == bad ? CheckResult::failed : CheckResult::passed));
   });
 }
 

@@ -199,7 +199,9 @@ TEST_CASE("P11: a slip during reacquisition is no continuation: after a gap the 
   });
 }
 
-TEST_CASE("single frequency, three satellites: a predicted displacement verifies them whatever the predicted positions; a wrong one does not, nor the policy off") {
+TEST_CASE(
+    "single frequency, three satellites: a predicted displacement verifies them whatever the predicted positions; a wrong one does not, "
+    "nor the policy off") {
   for_all_seeds(20, [](Rng& rng) {
     SimulatedPair s = random_pair(rng, {3, 0, 0});
     const Eigen::Vector3d way_m = s.rover.v_e_mps + random_vector<3>(rng, 0.005);

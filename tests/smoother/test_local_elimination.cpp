@@ -26,7 +26,8 @@ struct Measured {
   MatrixXd H;  ///< of [local, front, residual]
 
   /// `rows` of them each from one block; those of `rank` < dof see the first axes of the local variable only.
-  Measured(Rng& rng, int dof_, int e, int s, int rank, LocalOfThree& local) : dof(dof_), n(e + s + 1), H(MatrixXd::Zero(dof_ + n, dof_ + n)) {
+  Measured(Rng& rng, int dof_, int e, int s, int rank, LocalOfThree& local)
+      : dof(dof_), n(e + s + 1), H(MatrixXd::Zero(dof_ + n, dof_ + n)) {
     local.begin(e);
     for (int m = 0; m < 6; ++m) {
       const int side = e == 0 ? 1 : s == 0 ? 0 : integer(rng, 0, 1);

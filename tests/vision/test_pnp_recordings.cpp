@@ -100,8 +100,8 @@ std::string text_of(const Drift& d) {
   using searvins::examples::kDegPerRad;
   std::ostringstream out;
   out << d.frames + 1 << " frames, " << d.distance_m << " m: drift " << 100 * d.end_error_m / d.distance_m << " %, "
-      << kDegPerRad * d.end_turn_rad / d.distance_m << " deg/m; a step is off by " << d.step_rms_m << " m and " << kDegPerRad * d.step_turn_rms_rad
-      << " deg rms; inliers " << 100 * d.share << " %, " << d.rms_px << " px";
+      << kDegPerRad * d.end_turn_rad / d.distance_m << " deg/m; a step is off by " << d.step_rms_m << " m and "
+      << kDegPerRad * d.step_turn_rms_rad << " deg rms; inliers " << 100 * d.share << " %, " << d.rms_px << " px";
   return out.str();
 }
 

@@ -127,6 +127,7 @@ class Estimator {
   Status set_heading(double heading_rad, double sigma_rad) { return initializer_.set_heading(heading_rad, sigma_rad); }
 
   /// A map of lanes for stretches without integers (options: inertial.lanes, inertial.lane_way_m), in the caller's memory for as long as it is used.
+  /// A state that is not on a lane yet costs one pass over all of it.
   void set_centrelines(imu::Centrelines lines) { bound_.motion().set_centrelines(lines); }
 
   /// A reading, in time order. Errors: non_finite, duplicate, out_of_order, capacity_exceeded (ask next() for solutions more often).

@@ -91,7 +91,7 @@ class InertialMotion {
   explicit InertialMotion(const RtkOptions&, const Options& options = {}) : options_(options), detector_(options.preintegration.noise, options.detector) {}
 
   void set_frame(const geodesy::LocalFrame& frame) { earth_ = Earth{frame}, has_lane_ = false; }
-  /// A map, in the caller's memory for as long as this is used; an empty one ends its use.
+  /// A map, in the caller's memory for as long as this is used; an empty one ends its use. Every state that is not on a lane yet searches all of it.
   void set_centrelines(imu::Centrelines lines) { lines_ = lines, has_lane_ = false; }
   [[nodiscard]] const Options& options() const { return options_; }
   [[nodiscard]] const Earth& earth() const { return earth_; }

@@ -282,7 +282,6 @@ class RtkEstimator {
         predicted_e_m_ = frame_.to_ecef(antenna.position_w_m(predicted_));
         predicted_v_e_mps_ = frame_.R_ew * antenna.velocity_w_mps(predicted_);
         predicted_position_m2_ = P.template topLeftCorner<3, 3>();
-        predicted_velocity_e_mps2_ = frame_.R_ew * P.template bottomRightCorner<3, 3>() * frame_.R_ew.transpose();
         predicted_sigma_m_ = std::sqrt(std::max(1e-4, predicted_position_m2_.trace()));
         return;
       }
@@ -303,12 +302,15 @@ class RtkEstimator {
     return epoch_.base_status;
   }
 
-  /// The antenna's way since the epoch that the next one's phases are compared with, where readings predict it. Over seconds the error of a way is that of
-  /// the velocity times the time.
+  /// The antenna's displacement since the epoch that the next one's phases are compared with, where readings predict it and the slip tests ask for it
+  /// (CycleSlipOptions::predicted_motion). Over seconds its error is that of the velocity times the time.
   [[nodiscard]] std::optional<gnss::PredictedDisplacement> moved_since_compared(const RtkSolution& out) const {
+    if (!options_.differencing.slips.predicted_motion) return std::nullopt;
     if (!Motion::is_inertial || !is_predicted_ || !compared_.is_estimated) return std::nullopt;
     const double dt_s = seconds_between(compared_.time, out.time);
-    return gnss::PredictedDisplacement{predicted_e_m_ - compared_.position_e_m, dt_s * dt_s * predicted_velocity_e_mps2_};
+    const auto P = Motion::antenna_covariance(predicted_, predicted_covariance_, motion_.antenna_at(out.time));
+    const Eigen::Matrix3d velocity_covariance_e = frame_.R_ew * P.template bottomRightCorner<3, 3>() * frame_.R_ew.transpose();
+    return gnss::PredictedDisplacement{predicted_e_m_ - compared_.position_e_m, dt_s * dt_s * velocity_covariance_e};
   }
 
   /// What is left of the epoch are its Doppler shifts, which need no base.
@@ -1029,7 +1031,6 @@ class RtkEstimator {
   Eigen::Vector3d predicted_e_m_{Eigen::Vector3d::Zero()}, predicted_v_e_mps_{Eigen::Vector3d::Zero()};
   double predicted_sigma_m_{100}, clock_offset_s_{0};
   Eigen::Matrix3d predicted_position_m2_{Eigen::Matrix3d::Identity()};  ///< of the predicted antenna, in w
-  Eigen::Matrix3d predicted_velocity_e_mps2_{Eigen::Matrix3d::Identity()};  ///< of its velocity, (m/s)^2
   Compared compared_{};
   State predicted_{}, last_state_{};  ///< of the epoch at hand by the motion alone; the newest estimate
   StateCovariance predicted_covariance_{StateCovariance::Identity()}, last_covariance_{StateCovariance::Identity()};

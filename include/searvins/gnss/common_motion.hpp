@@ -59,7 +59,7 @@ struct MotionFit {
 
 /// What is known of the error of the predicted displacement before any phase is looked at.
 struct MotionPrior {
-  Eigen::Vector3d mean_e_m{Eigen::Vector3d::Zero()};              ///< m
+  Eigen::Vector3d mean_e_m{Eigen::Vector3d::Zero()};             ///< m
   Eigen::Matrix3d covariance_e_m2{Eigen::Matrix3d::Identity()};  ///< P, positive definite
 };
 
@@ -138,6 +138,17 @@ struct MotionEquations {
   return threshold_m <= 0.45 * c.wavelength_m ? CheckResult::passed : CheckResult::unavailable;
 }
 
+/// sum of min(r^2 / threshold^2, 1) over the changes at x = [d; c]; the sum ends early once it has reached `enough`.
+template <std::size_t N>
+[[nodiscard]] double truncated_cost(const StaticVector<PhaseChange, N>& changes, const Row4& x, double enough) {
+  double cost = 0;
+  for (std::size_t i = 0; i < changes.size() && cost < enough; ++i) {
+    const double z = motion_residual_m(changes[i], x) / changes[i].threshold_m;
+    cost += std::min(z * z, 1.0);
+  }
+  return cost;
+}
+
 /// Best [d; c] among at most 128 sets of four satellites; `first[k]`: first change of satellite k. False when no set is solvable.
 template <std::size_t N>
 [[nodiscard]] bool motion_by_consensus(const StaticVector<PhaseChange, N>& changes, const StaticVector<std::uint16_t, N>& first,
@@ -154,11 +165,7 @@ template <std::size_t N>
     Row4 x;
     Eigen::Matrix4d unused;
     if (!four.solve(x, unused)) continue;
-    double cost = 0;
-    for (std::size_t i = 0; i < changes.size() && cost < least; ++i) {
-      const double z = motion_residual_m(changes[i], x) / changes[i].threshold_m;
-      cost += std::min(z * z, 1.0);
-    }
+    const double cost = truncated_cost(changes, x, least);
     if (cost < least) least = cost, best = x;
   }
   return least <= static_cast<double>(changes.size());
@@ -174,8 +181,8 @@ void satellites_of(const StaticVector<PhaseChange, N>& changes, StaticVector<std
 /// Least squares from x over what agrees, until the set stays; then the verdicts. `known`: equations that take part from the beginning (a prior). At least
 /// min_satellites, and at least 60 % of all, must agree. s_m: sigma of a change where a prior takes part, else 0.
 template <std::size_t N>
-MotionFit fit_and_judge(const StaticVector<PhaseChange, N>& changes, const StaticVector<std::uint16_t, N>& first, Row4 x, const MotionEquations& known,
-                        int min_satellites, double s_m, StaticVector<CheckResult, N>& results) {
+MotionFit fit_and_judge(const StaticVector<PhaseChange, N>& changes, const StaticVector<std::uint16_t, N>& first, Row4 x,
+                        const MotionEquations& known, int min_satellites, double s_m, StaticVector<CheckResult, N>& results) {
   constexpr double least_redundancy = 0.2;  // 1 - leverage: below it the others do not predict the satellite
   MotionFit fit;
   StaticVector<std::uint8_t, N> votes;
@@ -232,8 +239,8 @@ MotionFit fit_and_judge(const StaticVector<PhaseChange, N>& changes, const Stati
 
 /// Best [d; c] among those that begin at the prior and the clock of one satellite; false when none is solvable.
 template <std::size_t N>
-[[nodiscard]] bool motion_by_prior(const StaticVector<PhaseChange, N>& changes, const StaticVector<std::uint16_t, N>& first, const MotionPrior& prior,
-                                   const MotionEquations& known, Row4& best) {
+[[nodiscard]] bool motion_by_prior(const StaticVector<PhaseChange, N>& changes, const StaticVector<std::uint16_t, N>& first,
+                                   const MotionPrior& prior, const MotionEquations& known, Row4& best) {
   double least = static_cast<double>(changes.size()) + 1;
   for (const std::uint16_t k : first) {
     MotionEquations near = known;
@@ -245,11 +252,7 @@ template <std::size_t N>
     Row4 x;
     Eigen::Matrix4d unused;
     if (!near.solve(x, unused)) continue;
-    double cost = 0;
-    for (const PhaseChange& c : changes) {
-      const double z = motion_residual_m(c, x) / c.threshold_m;
-      cost += std::min(z * z, 1.0);
-    }
+    const double cost = truncated_cost(changes, x, least);
     if (cost < least) least = cost, best = x;
   }
   return least <= static_cast<double>(changes.size());
@@ -273,7 +276,8 @@ MotionFit common_motion_check(const StaticVector<PhaseChange, N>& changes, Stati
 
 /// The same where the motion is predicted: at least two satellites, and 60 % of all, must agree. Nothing is said where the prior is not positive definite.
 template <std::size_t N>
-MotionFit predicted_motion_check(const StaticVector<PhaseChange, N>& changes, const MotionPrior& prior, StaticVector<CheckResult, N>& results) {
+MotionFit predicted_motion_check(const StaticVector<PhaseChange, N>& changes, const MotionPrior& prior,
+                                 StaticVector<CheckResult, N>& results) {
   constexpr int min_satellites = 2;
   results.clear();
   results.resize(changes.size());

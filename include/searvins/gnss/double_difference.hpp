@@ -62,7 +62,7 @@ class Differencer {
   /// Differences one rover epoch. `predicted_rover_e_m`: antenna position, good to some ten metres. The outcome does not depend on the
   /// order of satellites and signals in the epochs.
   ///
-  /// `moved`: since the epoch that is remembered (the last one with base data), where inertial readings tell.
+  /// `moved`: the antenna's displacement since the last epoch that had base data, whose phases this one's are compared with; none where nothing predicts it.
   ///
   /// Without usable base data the call succeeds, `out.base_status` says why there are no single differences, and the memory stays (the same
   /// epoch may be offered again). Errors, with `out` empty and the memory as it was: non_finite or invalid_argument (position), duplicate

@@ -55,7 +55,7 @@ struct PhaseEpoch {
   double base_age_s{0};
   std::uint32_t base_revision{0};  ///< counts the positions of the base
   Eigen::Vector3d position_e_m{Eigen::Vector3d::Zero()};  ///< predicted, where the ranges were computed
-  std::optional<PredictedDisplacement> moved{};           ///< since the remembered epoch
+  std::optional<PredictedDisplacement> moved{};           ///< since the epoch that phases are compared with
 };
 
 /// Continuity of up to N phases from epoch to epoch.
