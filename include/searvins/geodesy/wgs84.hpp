@@ -6,12 +6,14 @@
 ///     y = (N + h) cos(lat) sin(lon)
 ///     z = (N (1 - e^2) + h) sin(lat)
 ///
-/// Frame e is ECEF. Frame w is East-North-Up at an origin. R_ew maps w to e.
+/// Frame e is ECEF. Frame w is East-North-Up at an origin. R_ew maps w to e. Scalar of a position: double or wider.
 #pragma once
 
 #include <Eigen/Core>
 
 #include <cmath>
+
+#include <searvins/math/deferred.hpp>
 
 namespace searvins::geodesy {
 
@@ -26,7 +28,8 @@ struct Geodetic {
 };
 
 /// ECEF position of a geodetic one, metres.
-[[nodiscard]] inline Eigen::Vector3d ecef_from_geodetic(const Geodetic& g) {
+template <class Scalar = double>
+[[nodiscard]] math::Vector3<Scalar> ecef_from_geodetic(const Geodetic& g) {
   const double s = std::sin(g.lat_rad), c = std::cos(g.lat_rad);
   const double n = kSemiMajorAxisM / std::sqrt(1.0 - kEccentricitySquared * s * s);
   return {(n + g.height_m) * c * std::cos(g.lon_rad), (n + g.height_m) * c * std::sin(g.lon_rad),
@@ -36,7 +39,8 @@ struct Geodetic {
 /// Geodetic position of an ECEF one. Bowring's start and fixed-point refinement: a few rounding errors (measured 3 nm near the ground,
 /// 15 nm at 50,000 km) from 6000 km below the ellipsoid upwards. Within 43 km of the centre of the Earth latitude is not unique; the
 /// centre itself gives latitude 0. On the axis longitude is 0.
-[[nodiscard]] inline Geodetic geodetic_from_ecef(const Eigen::Vector3d& p_e_m) {
+template <class Scalar = double>
+[[nodiscard]] Geodetic geodetic_from_ecef(const math::Vector3<Scalar>& p_e_m) {
   const double rho = std::hypot(p_e_m.x(), p_e_m.y()), z = p_e_m.z();
   Geodetic g;
   g.lon_rad = rho > 0 ? std::atan2(p_e_m.y(), p_e_m.x()) : 0.0;
@@ -58,9 +62,10 @@ struct Geodetic {
 }
 
 /// R_ew: columns are the east, north and up axes at a geodetic position, in ECEF.
-[[nodiscard]] inline Eigen::Matrix3d ecef_from_enu(const Geodetic& g) {
+template <class Scalar = double>
+[[nodiscard]] math::Matrix3<Scalar> ecef_from_enu(const Geodetic& g) {
   const double sp = std::sin(g.lat_rad), cp = std::cos(g.lat_rad), sl = std::sin(g.lon_rad), cl = std::cos(g.lon_rad);
-  Eigen::Matrix3d R_ew;
+  math::Matrix3<Scalar> R_ew;
   R_ew << -sl, -sp * cl, cp * cl,  //
       cl, -sp * sl, cp * sl,       //
       0, cp, sp;

@@ -29,44 +29,52 @@
 namespace searvins::imu {
 
 /// Gravity near a point, m/s^2 in axes of w: see the file comment.
-struct GravityField {
-  Eigen::Vector3d reference_w_m{Eigen::Vector3d::Zero()};
-  Eigen::Vector3d gravity_w_mps2{Eigen::Vector3d::Zero()};  ///< at the reference point
-  Eigen::Matrix3d gradient_w_ps2{Eigen::Matrix3d::Zero()};  ///< d gravity / d position, 1/s^2
+template <class Scalar>
+struct BasicGravityField {
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
 
-  [[nodiscard]] Eigen::Vector3d at(const Eigen::Vector3d& p_w_m) const { return gravity_w_mps2 + gradient_w_ps2 * (p_w_m - reference_w_m); }
+  Vector3 reference_w_m{Vector3::Zero()};
+  Vector3 gravity_w_mps2{Vector3::Zero()};  ///< at the reference point
+  Matrix3 gradient_w_ps2{Matrix3::Zero()};  ///< d gravity / d position, 1/s^2
+
+  [[nodiscard]] Vector3 at(const Vector3& p_w_m) const { return gravity_w_mps2 + gradient_w_ps2 * (p_w_m - reference_w_m); }
 };
+using GravityField = BasicGravityField<double>;
 
-/// How the Earth enters: whether w turns (a compile-time policy), how fast, and the gravity near a position.
+/// How the Earth enters: whether w turns (a compile-time policy), how fast, and the gravity near a position; all in the model's Scalar.
 template <class E>
-concept EarthModel = std::copyable<E> && requires(const E& earth, const Eigen::Vector3d& p_w_m) {
+concept EarthModel = std::copyable<E> && requires(const E& earth, const Eigen::Matrix<typename E::Scalar, 3, 1>& p_w_m) {
   { E::rotates } -> std::convertible_to<bool>;
-  { earth.rate_w_radps() } -> std::convertible_to<Eigen::Vector3d>;
-  { earth.gravity_field(p_w_m) } -> std::same_as<GravityField>;
+  { earth.rate_w_radps() } -> std::convertible_to<Eigen::Matrix<typename E::Scalar, 3, 1>>;
+  { earth.gravity_field(p_w_m) } -> std::same_as<BasicGravityField<typename E::Scalar>>;
 };
 
 /// The WGS-84 Earth seen from a local frame. Rotates = false switches off its rotation (and with it the Coriolis acceleration); gravity
 /// stays that of the position.
-template <bool Rotates>
+template <bool Rotates, class S = double>
 struct LocalEarth {
+  using Scalar = S;
+  using Vector3 = Eigen::Matrix<S, 3, 1>;
+  using Matrix3 = Eigen::Matrix<S, 3, 3>;
   static constexpr bool rotates = Rotates;
-  geodesy::LocalFrame frame{};
+  geodesy::BasicLocalFrame<S> frame{};
 
   /// Rotation of w against inertial space, rad/s in axes of w.
-  [[nodiscard]] Eigen::Vector3d rate_w_radps() const {
+  [[nodiscard]] Vector3 rate_w_radps() const {
     if constexpr (Rotates) return geodesy::kEarthRateRadps * frame.R_ew.row(2).transpose();
-    return Eigen::Vector3d::Zero();
+    return Vector3::Zero();
   }
   /// Gravity at a position, m/s^2, both in w.
-  [[nodiscard]] Eigen::Vector3d gravity_w_mps2(const Eigen::Vector3d& p_w_m) const {
-    return frame.R_ew.transpose() * geodesy::gravity_e_mps2(frame.to_ecef(p_w_m));
+  [[nodiscard]] Vector3 gravity_w_mps2(const Vector3& p_w_m) const {
+    return frame.R_ew.transpose() * geodesy::gravity_e_mps2<S>(frame.to_ecef(p_w_m));
   }
   /// Gravity and its gradient at a position. Costs a geodetic conversion: make it once an interval.
-  [[nodiscard]] GravityField gravity_field(const Eigen::Vector3d& p_w_m) const {
-    const Eigen::Vector3d r_w_m = frame.R_ew.transpose() * frame.to_ecef(p_w_m), g = gravity_w_mps2(p_w_m);
-    const double radius_m = r_w_m.norm();
-    const Eigen::Vector3d n = r_w_m / radius_m;
-    return {p_w_m, g, -g.norm() / radius_m * (Eigen::Matrix3d::Identity() - 3.0 * n * n.transpose())};
+  [[nodiscard]] BasicGravityField<S> gravity_field(const Vector3& p_w_m) const {
+    const Vector3 r_w_m = frame.R_ew.transpose() * frame.to_ecef(p_w_m), g = gravity_w_mps2(p_w_m);
+    const S radius_m = r_w_m.norm();
+    const Vector3 n = r_w_m / radius_m;
+    return {p_w_m, g, -g.norm() / radius_m * (Matrix3::Identity() - 3.0 * n * n.transpose())};
   }
 };
 
@@ -76,37 +84,48 @@ using RotatingEarth = LocalEarth<true>;
 using FlatEarth = LocalEarth<false>;
 
 /// Gravity alone, the same everywhere: a laboratory frame whose place on the Earth is unknown.
-struct ConstantGravity {
+template <class S>
+struct BasicConstantGravity {
+  using Scalar = S;
+  using Vector3 = Eigen::Matrix<S, 3, 1>;
   static constexpr bool rotates = false;
-  Eigen::Vector3d gravity_w_mps2{0, 0, -9.80665};
+  Vector3 gravity_w_mps2{0, 0, -9.80665};
 
-  [[nodiscard]] Eigen::Vector3d rate_w_radps() const { return Eigen::Vector3d::Zero(); }
-  [[nodiscard]] GravityField gravity_field(const Eigen::Vector3d& p_w_m) const { return {p_w_m, gravity_w_mps2, Eigen::Matrix3d::Zero()}; }
+  [[nodiscard]] Vector3 rate_w_radps() const { return Vector3::Zero(); }
+  [[nodiscard]] BasicGravityField<S> gravity_field(const Vector3& p_w_m) const {
+    return {p_w_m, gravity_w_mps2, Eigen::Matrix<S, 3, 3>::Zero()};
+  }
 };
+using ConstantGravity = BasicConstantGravity<double>;
 
 static_assert(EarthModel<RotatingEarth> && EarthModel<FlatEarth> && EarthModel<ConstantGravity>);
 
 /// The turn of w over an interval: C, K, J1, J2 of the file comment.
-struct EarthTurn {
-  Eigen::Matrix3d C{Eigen::Matrix3d::Identity()};
-  Eigen::Matrix3d K{Eigen::Matrix3d::Zero()};
-  Eigen::Matrix3d J1{Eigen::Matrix3d::Zero()};
-  Eigen::Matrix3d J2{Eigen::Matrix3d::Zero()};
+template <class Scalar>
+struct BasicEarthTurn {
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+
+  Matrix3 C{Matrix3::Identity()};
+  Matrix3 K{Matrix3::Zero()};
+  Matrix3 J1{Matrix3::Zero()};
+  Matrix3 J2{Matrix3::Zero()};
 
   /// Over `duration_s` seconds at `rate_w_radps`.
-  [[nodiscard]] static EarthTurn over(const Eigen::Vector3d& rate_w_radps, double duration_s) {
-    const double T = duration_s;
-    const Eigen::Matrix3d I = Eigen::Matrix3d::Identity(), K = so3::skew(rate_w_radps), K2 = K * K;
-    return {so3::exp(Eigen::Vector3d{rate_w_radps * T}), K, T * I + T * T / 2 * K + T * T * T / 6 * K2,
+  [[nodiscard]] static BasicEarthTurn over(const Vector3& rate_w_radps, Scalar duration_s) {
+    const Scalar T = duration_s;
+    const Matrix3 I = Matrix3::Identity(), K = so3::skew(rate_w_radps), K2 = K * K;
+    return {so3::exp(Vector3{rate_w_radps * T}), K, T * I + T * T / 2 * K + T * T * T / 6 * K2,
             T * T / 2 * I + T * T * T / 6 * K + T * T * T * T / 24 * K2};
   }
   /// Without rotation.
-  [[nodiscard]] static EarthTurn none(double duration_s) {
-    EarthTurn turn;
-    turn.J1 = duration_s * Eigen::Matrix3d::Identity();
-    turn.J2 = duration_s * duration_s / 2 * Eigen::Matrix3d::Identity();
+  [[nodiscard]] static BasicEarthTurn none(Scalar duration_s) {
+    BasicEarthTurn turn;
+    turn.J1 = duration_s * Matrix3::Identity();
+    turn.J2 = duration_s * duration_s / 2 * Matrix3::Identity();
     return turn;
   }
 };
+using EarthTurn = BasicEarthTurn<double>;
 
 }  // namespace searvins::imu

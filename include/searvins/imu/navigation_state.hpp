@@ -16,9 +16,12 @@
 namespace searvins::imu {
 
 /// See the file comment.
-struct NavigationState {
-  using Scalar = double;
-  using Step = Eigen::Matrix<double, 15, 1>;
+template <class S>
+struct BasicNavigationState {
+  using Scalar = S;
+  using Vector3 = Eigen::Matrix<S, 3, 1>;
+  using Matrix3 = Eigen::Matrix<S, 3, 3>;
+  using Step = Eigen::Matrix<S, 15, 1>;
   static constexpr int dof = 15;
   static constexpr smoother::Role role = smoother::Role::state;
   static constexpr const char* name = "navigation state";
@@ -30,37 +33,38 @@ struct NavigationState {
   /// First axis of each part in the tangent vector.
   enum Axis : int { attitude = 0, position = 3, velocity = 6, accel_bias = 9, gyro_bias = 12 };
 
-  Eigen::Matrix3d R_wb{Eigen::Matrix3d::Identity()};
-  Eigen::Vector3d p_wb_m{Eigen::Vector3d::Zero()};
-  Eigen::Vector3d v_wb_mps{Eigen::Vector3d::Zero()};
-  Eigen::Vector3d accel_bias_b_mps2{Eigen::Vector3d::Zero()};
-  Eigen::Vector3d gyro_bias_b_radps{Eigen::Vector3d::Zero()};
+  Matrix3 R_wb{Matrix3::Identity()};
+  Vector3 p_wb_m{Vector3::Zero()};
+  Vector3 v_wb_mps{Vector3::Zero()};
+  Vector3 accel_bias_b_mps2{Vector3::Zero()};
+  Vector3 gyro_bias_b_radps{Vector3::Zero()};
 
-  [[nodiscard]] NavigationState retract(const Step& d) const {
-    NavigationState y;
-    y.R_wb = R_wb * so3::exp(d.segment<3>(attitude));
-    y.p_wb_m = p_wb_m + d.segment<3>(position);
-    y.v_wb_mps = v_wb_mps + d.segment<3>(velocity);
-    y.accel_bias_b_mps2 = accel_bias_b_mps2 + d.segment<3>(accel_bias);
-    y.gyro_bias_b_radps = gyro_bias_b_radps + d.segment<3>(gyro_bias);
+  [[nodiscard]] BasicNavigationState retract(const Step& d) const {
+    BasicNavigationState y;
+    y.R_wb = R_wb * so3::exp(d.template segment<3>(attitude));
+    y.p_wb_m = p_wb_m + d.template segment<3>(position);
+    y.v_wb_mps = v_wb_mps + d.template segment<3>(velocity);
+    y.accel_bias_b_mps2 = accel_bias_b_mps2 + d.template segment<3>(accel_bias);
+    y.gyro_bias_b_radps = gyro_bias_b_radps + d.template segment<3>(gyro_bias);
     return y;
   }
-  [[nodiscard]] Step local(const NavigationState& y) const {
+  [[nodiscard]] Step local(const BasicNavigationState& y) const {
     Step d;
-    d.segment<3>(attitude) = so3::log(R_wb.transpose() * y.R_wb);
-    d.segment<3>(position) = y.p_wb_m - p_wb_m;
-    d.segment<3>(velocity) = y.v_wb_mps - v_wb_mps;
-    d.segment<3>(accel_bias) = y.accel_bias_b_mps2 - accel_bias_b_mps2;
-    d.segment<3>(gyro_bias) = y.gyro_bias_b_radps - gyro_bias_b_radps;
+    d.template segment<3>(attitude) = so3::log(R_wb.transpose() * y.R_wb);
+    d.template segment<3>(position) = y.p_wb_m - p_wb_m;
+    d.template segment<3>(velocity) = y.v_wb_mps - v_wb_mps;
+    d.template segment<3>(accel_bias) = y.accel_bias_b_mps2 - accel_bias_b_mps2;
+    d.template segment<3>(gyro_bias) = y.gyro_bias_b_radps - gyro_bias_b_radps;
     return d;
   }
   /// How far each part may move before its factors bend noticeably: 10 mrad of attitude turn 10 m/s^2 by 0.5 mm/s^2 in second order.
   [[nodiscard]] static Step linearisation_scale() {
     Step s;
-    s << Eigen::Vector3d::Constant(1e-2), Eigen::Vector3d::Ones(), Eigen::Vector3d::Ones(), Eigen::Vector3d::Constant(0.1), Eigen::Vector3d::Constant(1e-2);
+    s << Vector3::Constant(1e-2), Vector3::Ones(), Vector3::Ones(), Vector3::Constant(0.1), Vector3::Constant(1e-2);
     return s;
   }
 };
+using NavigationState = BasicNavigationState<double>;
 
 static_assert(smoother::Variable<NavigationState>);
 

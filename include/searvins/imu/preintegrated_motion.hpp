@@ -38,7 +38,10 @@ struct ImuBias {
 };
 
 /// The biases of a navigation state.
-[[nodiscard]] inline ImuBias<double> bias_of(const NavigationState& x) { return {x.accel_bias_b_mps2, x.gyro_bias_b_radps}; }
+template <class S>
+[[nodiscard]] ImuBias<S> bias_of(const BasicNavigationState<S>& x) {
+  return {x.accel_bias_b_mps2, x.gyro_bias_b_radps};
+}
 
 /// See the file comment. Axes: the body at the start (dR maps the body at the end to it).
 template <class S>
