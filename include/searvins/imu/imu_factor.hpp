@@ -71,32 +71,33 @@ template <int N>
 /// See the file comment. Rows in the order of the state's axes: attitude, position, velocity, accelerometer bias, gyroscope bias.
 template <EarthModel Earth = RotatingEarth>
 struct ImuFactor {
-  using Scalar = double;
-  using Vector3 = Eigen::Vector3d;
-  using Matrix3 = Eigen::Matrix3d;
-  using Matrix9 = Eigen::Matrix<double, 9, 9>;
-  using State = NavigationState;
+  using Scalar = typename Earth::Scalar;
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+  using Matrix9 = Eigen::Matrix<Scalar, 9, 9>;
+  using State = BasicNavigationState<Scalar>;
+  using Turn = BasicEarthTurn<Scalar>;
   static constexpr int max_rows = 15, max_keys = 2, max_columns = 30;
   static constexpr const char* name = "inertial";
 
   smoother::Key<State> from{}, to{};
-  PreintegratedMotion<double> motion{};
+  PreintegratedMotion<Scalar> motion{};
   Vector3 earth_rate_w_radps{Vector3::Zero()};
-  GravityField gravity{};
+  BasicGravityField<Scalar> gravity{};
   Matrix9 root_information{Matrix9::Identity()};     ///< of the motion
-  double accel_walk_weight{1}, gyro_walk_weight{1};  ///< 1 / sigma of the biases' walk over the interval
+  Scalar accel_walk_weight{1}, gyro_walk_weight{1};  ///< 1 / sigma of the biases' walk over the interval
 
   /// A factor from a motion. `near_w_m`: where the interval begins, to some 100 m; gravity and its gradient are taken there.
   /// Errors: not_positive_definite (motion's covariance), invalid_argument (duration, walk densities).
   [[nodiscard]] static Result<ImuFactor> make(const smoother::Key<State>& from, const smoother::Key<State>& to,
-                                              const PreintegratedMotion<double>& motion, const ImuNoise& noise, const Earth& earth,
+                                              const PreintegratedMotion<Scalar>& motion, const ImuNoise& noise, const Earth& earth,
                                               const Vector3& near_w_m) {
     const double accel_walk = noise.accel_bias_walk_mps3_sqrt_hz, gyro_walk = noise.gyro_bias_walk_radps2_sqrt_hz;
     if (!(motion.duration_s > 0)) return failure(StatusCode::invalid_argument, "an inertial factor needs an interval of positive length");
     if (!(accel_walk > 0 && gyro_walk > 0)) return failure(StatusCode::invalid_argument, "densities of the bias walks must be positive");
     const auto root = square_root_information<9>(motion.covariance);
     if (!root) return root.status();
-    const double root_T = std::sqrt(motion.duration_s);
+    const Scalar root_T = std::sqrt(motion.duration_s);
     return ImuFactor{from,
                      to,
                      motion,
@@ -113,16 +114,16 @@ struct ImuFactor {
     visit(from), visit(to);
   }
   template <class Values>
-  void evaluate(const Values& values, double* e) const {
+  void evaluate(const Values& values, Scalar* e) const {
     residual(values(from), values(to), e, nullptr);
   }
   template <class Values>
-  void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
+  void linearise(const Values& values, Scalar* e, smoother::JacobianRef<Scalar> J) const {
     MotionJacobian d;
     residual(values(from), values(to), e, &d);
     for (int c = 0; c < kMotionColumns; ++c)
       for (int i = 0; i < 9; ++i) {
-        double sum = 0;
+        Scalar sum = 0;
         for (int k = i; k < 9; ++k) sum += root_information(i, k) * d(k, c);
         J(i, c) = sum;
       }
@@ -133,26 +134,26 @@ struct ImuFactor {
       J(State::gyro_bias + i, 15 + State::gyro_bias + i) = gyro_walk_weight;
     }
   }
-  double weigh(const double* e, double* w) const { return smoother::weigh_gaussian(e, 15, w); }
+  Scalar weigh(const Scalar* e, Scalar* w) const { return smoother::weigh_gaussian(e, 15, w); }
 
  private:
   static constexpr int kMotionColumns = 24;  // all of state i; attitude, position and velocity of state j
-  using MotionJacobian = Eigen::Matrix<double, 9, kMotionColumns>;
+  using MotionJacobian = Eigen::Matrix<Scalar, 9, kMotionColumns>;
 
-  [[nodiscard]] EarthTurn turn() const {
-    if constexpr (Earth::rotates) return EarthTurn::over(earth_rate_w_radps, motion.duration_s);
-    return EarthTurn::none(motion.duration_s);
+  [[nodiscard]] Turn turn() const {
+    if constexpr (Earth::rotates) return Turn::over(earth_rate_w_radps, motion.duration_s);
+    return Turn::none(motion.duration_s);
   }
 
-  void residual(const State& x, const State& y, double* e, MotionJacobian* J) const {
-    const double T = motion.duration_s;
-    const EarthTurn w = turn();
+  void residual(const State& x, const State& y, Scalar* e, MotionJacobian* J) const {
+    const Scalar T = motion.duration_s;
+    const Turn w = turn();
     const auto m = motion.corrected(bias_of(x));
     const Matrix3 Rt = x.R_wb.transpose(), X = m.dR.transpose() * Rt * w.C * y.R_wb;
     const Vector3 d = y.p_wb_m - x.p_wb_m, g = gravity.at(x.p_wb_m), Gd = gravity.gradient_w_ps2 * d, Cd = w.C * d;
     const Vector3 z_p = Rt * (Cd - T * x.v_wb_mps - w.J2 * (g + Gd / 3));
     const Vector3 z_v = Rt * (w.C * y.v_wb_mps + w.K * Cd - x.v_wb_mps - w.J1 * (g + Gd / 2));
-    Eigen::Matrix<double, 9, 1> r;
+    Eigen::Matrix<Scalar, 9, 1> r;
     r << so3::log(X), z_p - m.dp_m, z_v - m.dv_mps;
     for (int i = 0; i < 9; ++i) {
       e[i] = 0;
@@ -162,31 +163,31 @@ struct ImuFactor {
       e[State::accel_bias + i] = accel_walk_weight * (y.accel_bias_b_mps2[i] - x.accel_bias_b_mps2[i]);
       e[State::gyro_bias + i] = gyro_walk_weight * (y.gyro_bias_b_radps[i] - x.gyro_bias_b_radps[i]);
     }
-    if (J) motion_jacobian(r.head<3>(), X, Rt, z_p, z_v, m.turn_rad, y, w, *J);
+    if (J) motion_jacobian(r.template head<3>(), X, Rt, z_p, z_v, m.turn_rad, y, w, *J);
   }
 
   void motion_jacobian(const Vector3& r_theta, const Matrix3& X, const Matrix3& Rt, const Vector3& z_p, const Vector3& z_v,
-                       const Vector3& turn_rad, const State& y, const EarthTurn& w, MotionJacobian& J) const {
+                       const Vector3& turn_rad, const State& y, const Turn& w, MotionJacobian& J) const {
     constexpr int t = State::attitude, p = State::position, v = State::velocity, ba = State::accel_bias, bg = State::gyro_bias, next = 15;
     const Matrix3 inverse = so3::right_jacobian_inverse(r_theta), RtC = Rt * w.C, RtKC = Rt * w.K * w.C;
     const Matrix3 G2 = Rt * w.J2 * gravity.gradient_w_ps2 / 3, G1 = Rt * w.J1 * gravity.gradient_w_ps2 / 2;
     J.setZero();
-    J.block<3, 3>(t, t) = -inverse * y.R_wb.transpose() * RtC.transpose();
-    J.block<3, 3>(t, bg) = -inverse * X.transpose() * so3::right_jacobian(turn_rad) * motion.d_R_d_gyro_bias;
-    J.block<3, 3>(t, next + t) = inverse;
-    J.block<3, 3>(p, t) = so3::skew(z_p);
-    J.block<3, 3>(p, p) = -RtC - 2 * G2;
-    J.block<3, 3>(p, v) = -motion.duration_s * Rt;
-    J.block<3, 3>(p, ba) = -motion.d_p_d_accel_bias;
-    J.block<3, 3>(p, bg) = -motion.d_p_d_gyro_bias;
-    J.block<3, 3>(p, next + p) = RtC - G2;
-    J.block<3, 3>(v, t) = so3::skew(z_v);
-    J.block<3, 3>(v, p) = -RtKC - G1;
-    J.block<3, 3>(v, v) = -Rt;
-    J.block<3, 3>(v, ba) = -motion.d_v_d_accel_bias;
-    J.block<3, 3>(v, bg) = -motion.d_v_d_gyro_bias;
-    J.block<3, 3>(v, next + p) = RtKC - G1;
-    J.block<3, 3>(v, next + v) = RtC;
+    J.template block<3, 3>(t, t) = -inverse * y.R_wb.transpose() * RtC.transpose();
+    J.template block<3, 3>(t, bg) = -inverse * X.transpose() * so3::right_jacobian(turn_rad) * motion.d_R_d_gyro_bias;
+    J.template block<3, 3>(t, next + t) = inverse;
+    J.template block<3, 3>(p, t) = so3::skew(z_p);
+    J.template block<3, 3>(p, p) = -RtC - 2 * G2;
+    J.template block<3, 3>(p, v) = -motion.duration_s * Rt;
+    J.template block<3, 3>(p, ba) = -motion.d_p_d_accel_bias;
+    J.template block<3, 3>(p, bg) = -motion.d_p_d_gyro_bias;
+    J.template block<3, 3>(p, next + p) = RtC - G2;
+    J.template block<3, 3>(v, t) = so3::skew(z_v);
+    J.template block<3, 3>(v, p) = -RtKC - G1;
+    J.template block<3, 3>(v, v) = -Rt;
+    J.template block<3, 3>(v, ba) = -motion.d_v_d_accel_bias;
+    J.template block<3, 3>(v, bg) = -motion.d_v_d_gyro_bias;
+    J.template block<3, 3>(v, next + p) = RtKC - G1;
+    J.template block<3, 3>(v, next + v) = RtC;
   }
 };
 

@@ -26,13 +26,17 @@ enum class SampleKind : std::uint8_t {
 };
 
 /// One reading in GPS time.
-struct ImuSample {
+template <class Scalar>
+struct BasicImuSample {
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+
   GpsTime time{};
-  Eigen::Vector3d gyro_b_radps{Eigen::Vector3d::Zero()};
-  Eigen::Vector3d accel_b_mps2{Eigen::Vector3d::Zero()};
+  Vector3 gyro_b_radps{Vector3::Zero()};
+  Vector3 accel_b_mps2{Vector3::Zero()};
 
   [[nodiscard]] bool finite() const { return gyro_b_radps.allFinite() && accel_b_mps2.allFinite(); }
 };
+using ImuSample = BasicImuSample<double>;
 
 /// Noise of a unit: densities of white noise and of the bias walks, and how far a bias may be off at the start. Defaults: a MEMS unit for vehicles.
 struct ImuNoise {

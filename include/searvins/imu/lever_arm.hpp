@@ -21,35 +21,40 @@
 namespace searvins::imu {
 
 /// See the file comment. The antenna model of gnss/gnss_factors.hpp for navigation states.
-struct LeverArm {
-  using Jacobian = Eigen::Matrix<double, 3, NavigationState::dof>;
-  Eigen::Vector3d lever_arm_b_m{Eigen::Vector3d::Zero()};      ///< l
-  Eigen::Vector3d gyro_b_radps{Eigen::Vector3d::Zero()};       ///< reading at the state's time
-  Eigen::Vector3d earth_rate_w_radps{Eigen::Vector3d::Zero()};  ///< Omega_w
+template <class Scalar>
+struct BasicLeverArm {
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+  using State = BasicNavigationState<Scalar>;
+  using Jacobian = Eigen::Matrix<Scalar, 3, State::dof>;
+  Vector3 lever_arm_b_m{Vector3::Zero()};       ///< l
+  Vector3 gyro_b_radps{Vector3::Zero()};        ///< reading at the state's time
+  Vector3 earth_rate_w_radps{Vector3::Zero()};  ///< Omega_w
 
   /// Antenna in w, m; optionally its Jacobian.
-  [[nodiscard]] Eigen::Vector3d position_w_m(const NavigationState& x, Jacobian* d_state = nullptr) const {
+  [[nodiscard]] Vector3 position_w_m(const State& x, Jacobian* d_state = nullptr) const {
     if (d_state) {
       d_state->setZero();
-      d_state->middleCols<3>(NavigationState::attitude) = -x.R_wb * so3::skew(lever_arm_b_m);
-      d_state->middleCols<3>(NavigationState::position).setIdentity();
+      d_state->template middleCols<3>(State::attitude) = -x.R_wb * so3::skew(lever_arm_b_m);
+      d_state->template middleCols<3>(State::position).setIdentity();
     }
     return x.p_wb_m + x.R_wb * lever_arm_b_m;
   }
 
   /// Velocity of the antenna relative to the Earth, in w, m/s; optionally its Jacobian.
-  [[nodiscard]] Eigen::Vector3d velocity_w_mps(const NavigationState& x, Jacobian* d_state = nullptr) const {
-    const Eigen::Vector3d u = x.R_wb.transpose() * earth_rate_w_radps;
-    const Eigen::Vector3d swing = (gyro_b_radps - x.gyro_bias_b_radps - u).cross(lever_arm_b_m);
+  [[nodiscard]] Vector3 velocity_w_mps(const State& x, Jacobian* d_state = nullptr) const {
+    const Vector3 u = x.R_wb.transpose() * earth_rate_w_radps;
+    const Vector3 swing = (gyro_b_radps - x.gyro_bias_b_radps - u).cross(lever_arm_b_m);
     if (d_state) {
-      const Eigen::Matrix3d arm = so3::skew(lever_arm_b_m);
+      const Matrix3 arm = so3::skew(lever_arm_b_m);
       d_state->setZero();
-      d_state->middleCols<3>(NavigationState::attitude) = x.R_wb * (arm * so3::skew(u) - so3::skew(swing));
-      d_state->middleCols<3>(NavigationState::velocity).setIdentity();
-      d_state->middleCols<3>(NavigationState::gyro_bias) = x.R_wb * arm;
+      d_state->template middleCols<3>(State::attitude) = x.R_wb * (arm * so3::skew(u) - so3::skew(swing));
+      d_state->template middleCols<3>(State::velocity).setIdentity();
+      d_state->template middleCols<3>(State::gyro_bias) = x.R_wb * arm;
     }
     return x.v_wb_mps + x.R_wb * swing;
   }
 };
+using LeverArm = BasicLeverArm<double>;
 
 }  // namespace searvins::imu

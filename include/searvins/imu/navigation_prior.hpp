@@ -26,19 +26,23 @@ struct NavigationSigmas {
 };
 
 /// See the file comment.
-struct NavigationPriorFactor {
-  using Scalar = double;
-  using Matrix15 = Eigen::Matrix<double, 15, 15>;
+template <class S>
+struct BasicNavigationPriorFactor {
+  using Scalar = S;
+  using State = BasicNavigationState<S>;
+  using Vector3 = Eigen::Matrix<S, 3, 1>;
+  using Matrix3 = Eigen::Matrix<S, 3, 3>;
+  using Matrix15 = Eigen::Matrix<S, 15, 15>;
   static constexpr int max_rows = 15, max_keys = 1, max_columns = 15;
   static constexpr const char* name = "navigation prior";
 
-  smoother::Key<NavigationState> state{};
-  NavigationState mean{};
+  smoother::Key<State> state{};
+  State mean{};
   Matrix15 root_information{Matrix15::Identity()};
 
   /// From sigmas. Errors: invalid_argument (a sigma that is not positive).
-  [[nodiscard]] static Result<NavigationPriorFactor> make(const smoother::Key<NavigationState>& state, const NavigationState& mean,
-                                                          const NavigationSigmas& s) {
+  [[nodiscard]] static Result<BasicNavigationPriorFactor> make(const smoother::Key<State>& state, const State& mean,
+                                                               const NavigationSigmas& s) {
     const double heading = s.heading_rad == 0 ? s.attitude_rad : s.heading_rad;
     const double sigmas[] = {s.attitude_rad, s.position_m, s.velocity_mps, s.accel_bias_mps2, s.gyro_bias_radps, heading};
     for (double sigma : sigmas)
@@ -46,16 +50,16 @@ struct NavigationPriorFactor {
         return failure(StatusCode::invalid_argument, "sigmas of a prior must be positive", -1, -1, sigma);
     Matrix15 covariance = Matrix15::Zero();
     for (int i = 0; i < 15; ++i) covariance(i, i) = sigmas[i / 3] * sigmas[i / 3];
-    const Eigen::Vector3d up_b = mean.R_wb.row(2).transpose();  // turning about the up axis of w: dtheta = R_wb' e_up
-    covariance.topLeftCorner<3, 3>() += (heading * heading - s.attitude_rad * s.attitude_rad) * up_b * up_b.transpose();
+    const Vector3 up_b = mean.R_wb.row(2).transpose();  // turning about the up axis of w: dtheta = R_wb' e_up
+    covariance.template topLeftCorner<3, 3>() += (heading * heading - s.attitude_rad * s.attitude_rad) * up_b * up_b.transpose();
     return make(state, mean, covariance);
   }
   /// From a covariance in the order of the state's axes. Errors: not_positive_definite.
-  [[nodiscard]] static Result<NavigationPriorFactor> make(const smoother::Key<NavigationState>& state, const NavigationState& mean,
-                                                          const Matrix15& covariance) {
+  [[nodiscard]] static Result<BasicNavigationPriorFactor> make(const smoother::Key<State>& state, const State& mean,
+                                                               const Matrix15& covariance) {
     const auto root = square_root_information<15>(covariance);
     if (!root) return root.status();
-    return NavigationPriorFactor{state, mean, *root};
+    return BasicNavigationPriorFactor{state, mean, *root};
   }
 
   [[nodiscard]] int rows() const { return 15; }
@@ -64,33 +68,34 @@ struct NavigationPriorFactor {
     visit(state);
   }
   template <class Values>
-  void evaluate(const Values& values, double* e) const {
+  void evaluate(const Values& values, Scalar* e) const {
     whiten(mean.local(values(state)), e);
   }
   template <class Values>
-  void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
-    const NavigationState::Step r = mean.local(values(state));
+  void linearise(const Values& values, Scalar* e, smoother::JacobianRef<Scalar> J) const {
+    const typename State::Step r = mean.local(values(state));
     whiten(r, e);
-    const Eigen::Matrix3d turn = so3::right_jacobian_inverse(r.head<3>());
+    const Matrix3 turn = so3::right_jacobian_inverse(r.template head<3>());
     for (int c = 0; c < 3; ++c)
       for (int i = 0; i < 3; ++i) {
-        double sum = 0;
+        Scalar sum = 0;
         for (int k = i; k < 3; ++k) sum += root_information(i, k) * turn(k, c);
         J(i, c) = sum;
       }
     for (int c = 3; c < 15; ++c)
       for (int i = 0; i <= c; ++i) J(i, c) = root_information(i, c);
   }
-  double weigh(const double* e, double* w) const { return smoother::weigh_gaussian(e, 15, w); }
+  Scalar weigh(const Scalar* e, Scalar* w) const { return smoother::weigh_gaussian(e, 15, w); }
 
  private:
-  void whiten(const NavigationState::Step& r, double* e) const {
+  void whiten(const typename State::Step& r, Scalar* e) const {
     for (int i = 0; i < 15; ++i) {
       e[i] = 0;
       for (int k = i; k < 15; ++k) e[i] += root_information(i, k) * r[k];
     }
   }
 };
+using NavigationPriorFactor = BasicNavigationPriorFactor<double>;
 
 static_assert(smoother::Factor<NavigationPriorFactor>);
 

@@ -23,25 +23,30 @@
 namespace searvins::imu {
 
 /// See the file comment.
-struct PositionFactor {
-  using Scalar = double;
-  static constexpr int max_rows = 3, max_keys = 1, max_columns = NavigationState::dof;
+template <class S>
+struct BasicPositionFactor {
+  using Scalar = S;
+  using State = BasicNavigationState<S>;
+  using Antenna = BasicLeverArm<S>;
+  using Vector3 = Eigen::Matrix<S, 3, 1>;
+  using Matrix3 = Eigen::Matrix<S, 3, 3>;
+  static constexpr int max_rows = 3, max_keys = 1, max_columns = State::dof;
   static constexpr const char* name = "position";
 
-  smoother::Key<NavigationState> state{};
-  LeverArm antenna{};
-  Eigen::Vector3d position_w_m{Eigen::Vector3d::Zero()};         ///< antenna, w
-  Eigen::Matrix3d root_information{Eigen::Matrix3d::Identity()};  ///< R
-  robust::Huber<double> loss{2.5};
+  smoother::Key<State> state{};
+  Antenna antenna{};
+  Vector3 position_w_m{Vector3::Zero()};          ///< antenna, w
+  Matrix3 root_information{Matrix3::Identity()};  ///< R
+  robust::Huber<S> loss{2.5};
 
   /// `floor_m`: sigma that is added to every axis. Errors: not_positive_definite, also for NaN.
-  [[nodiscard]] static Result<PositionFactor> make(const smoother::Key<NavigationState>& state, const LeverArm& antenna, const Eigen::Vector3d& position_w_m,
-                                                   const Eigen::Matrix3d& covariance_w_m2, double floor_m) {
-    const Eigen::Matrix3d C = covariance_w_m2 + floor_m * floor_m * Eigen::Matrix3d::Identity();
+  [[nodiscard]] static Result<BasicPositionFactor> make(const smoother::Key<State>& state, const Antenna& antenna, const Vector3& position_w_m,
+                                                        const Matrix3& covariance_w_m2, Scalar floor_m) {
+    const Matrix3 C = covariance_w_m2 + floor_m * floor_m * Matrix3::Identity();
     const auto root = square_root_information<3>(C);
     if (!root.ok()) return root.status();
     if (!position_w_m.allFinite()) return failure(StatusCode::non_finite, "position is not finite");
-    PositionFactor f;
+    BasicPositionFactor f;
     f.state = state, f.antenna = antenna, f.position_w_m = position_w_m, f.root_information = *root;
     return f;
   }
@@ -52,23 +57,24 @@ struct PositionFactor {
     visit(state);
   }
   template <class Values>
-  void evaluate(const Values& values, double* e) const {
-    Eigen::Map<Eigen::Vector3d>(e).noalias() = root_information * (antenna.position_w_m(values(state)) - position_w_m);
+  void evaluate(const Values& values, Scalar* e) const {
+    Eigen::Map<Vector3>(e).noalias() = root_information * (antenna.position_w_m(values(state)) - position_w_m);
   }
   template <class Values>
-  void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
-    LeverArm::Jacobian d_antenna;
-    Eigen::Map<Eigen::Vector3d>(e).noalias() = root_information * (antenna.position_w_m(values(state), &d_antenna) - position_w_m);
-    const Eigen::Matrix<double, 3, NavigationState::dof> rows = root_information.lazyProduct(d_antenna);
-    for (int c = 0; c < NavigationState::dof; ++c)
+  void linearise(const Values& values, Scalar* e, smoother::JacobianRef<Scalar> J) const {
+    typename Antenna::Jacobian d_antenna;
+    Eigen::Map<Vector3>(e).noalias() = root_information * (antenna.position_w_m(values(state), &d_antenna) - position_w_m);
+    const Eigen::Matrix<S, 3, State::dof> rows = root_information.lazyProduct(d_antenna);
+    for (int c = 0; c < State::dof; ++c)
       for (int i = 0; i < 3; ++i) J(i, c) = rows(i, c);
   }
-  double weigh(const double* e, double* w) const {
-    const double z2 = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
+  Scalar weigh(const Scalar* e, Scalar* w) const {
+    const Scalar z2 = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
     std::fill_n(w, 3, loss.weight(z2));
     return loss.rho(z2);
   }
 };
+using PositionFactor = BasicPositionFactor<double>;
 
 static_assert(smoother::Factor<PositionFactor>);
 

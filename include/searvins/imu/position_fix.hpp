@@ -11,18 +11,23 @@
 
 namespace searvins::imu {
 
-/// The antenna's position, and its velocity where the source has one.
-struct PositionFix {
+/// The antenna's position, and its velocity where the source has one. Scalar: double or wider.
+template <class Scalar>
+struct BasicPositionFix {
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+
   GpsTime time{};
-  Eigen::Vector3d position_e_m{Eigen::Vector3d::Zero()};        ///< antenna phase centre, ECEF
-  Eigen::Matrix3d covariance_e_m2{Eigen::Matrix3d::Identity()};  ///< of the position, ECEF
+  Vector3 position_e_m{Vector3::Zero()};         ///< antenna phase centre, ECEF
+  Matrix3 covariance_e_m2{Matrix3::Identity()};  ///< of the position, ECEF
   int quality{0};     ///< RTKLIB's number: 1 fix, 2 float, 3 sbas, 4 dgps, 5 single, 6 ppp, 7 dead reckoning
   int satellites{-1};  ///< -1: not known
   bool covariance_assumed{false};  ///< the source gave none: the covariance is a guess from the quality
-  Eigen::Vector3d velocity_e_mps{Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN())};  ///< ECEF; NaN: none
-  double sigma_velocity_mps{0};                                                                           ///< of each axis
+  Vector3 velocity_e_mps{Vector3::Constant(std::numeric_limits<Scalar>::quiet_NaN())};  ///< ECEF; NaN: none
+  Scalar sigma_velocity_mps{0};                                                          ///< of each axis
 
   [[nodiscard]] bool has_velocity() const { return velocity_e_mps.allFinite() && sigma_velocity_mps > 0; }
 };
+using PositionFix = BasicPositionFix<double>;
 
 }  // namespace searvins::imu

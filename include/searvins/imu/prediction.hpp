@@ -28,20 +28,27 @@
 namespace searvins::imu {
 
 /// Covariance of a navigation state, in the order of its tangent vector.
-using NavigationCovariance = Eigen::Matrix<double, 15, 15>;
+template <class Scalar>
+using BasicNavigationCovariance = Eigen::Matrix<Scalar, 15, 15>;
+using NavigationCovariance = BasicNavigationCovariance<double>;
 
 /// The state at the end of a motion. The motion's first-order bias correction is applied for the biases of `x`.
 template <EarthModel Earth>
-[[nodiscard]] NavigationState predict(const NavigationState& x, const PreintegratedMotion<double>& motion, const Earth& earth) {
-  const double T = motion.duration_s;
-  const GravityField gravity = earth.gravity_field(x.p_wb_m);
-  EarthTurn w = EarthTurn::none(T);
-  if constexpr (Earth::rotates) w = EarthTurn::over(earth.rate_w_radps(), T);
+[[nodiscard]] BasicNavigationState<typename Earth::Scalar> predict(const BasicNavigationState<typename Earth::Scalar>& x,
+                                                                   const PreintegratedMotion<typename Earth::Scalar>& motion,
+                                                                   const Earth& earth) {
+  using Scalar = typename Earth::Scalar;
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Turn = BasicEarthTurn<Scalar>;
+  const Scalar T = motion.duration_s;
+  const BasicGravityField<Scalar> gravity = earth.gravity_field(x.p_wb_m);
+  Turn w = Turn::none(T);
+  if constexpr (Earth::rotates) w = Turn::over(earth.rate_w_radps(), T);
   const auto m = motion.corrected(bias_of(x));
-  const Eigen::Vector3d g = gravity.gravity_w_mps2, way = T * x.v_wb_mps + x.R_wb * m.dp_m;
-  Eigen::Vector3d d = Eigen::Vector3d::Zero();
+  const Vector3 g = gravity.gravity_w_mps2, way = T * x.v_wb_mps + x.R_wb * m.dp_m;
+  Vector3 d = Vector3::Zero();
   for (int pass = 0; pass < 3; ++pass) d = w.C.transpose() * (way + w.J2 * (g + gravity.gradient_w_ps2 * d / 3));
-  NavigationState y = x;
+  BasicNavigationState<Scalar> y = x;
   y.R_wb = w.C.transpose() * x.R_wb * m.dR;
   y.p_wb_m = x.p_wb_m + d;
   y.v_wb_mps = w.C.transpose() * (x.v_wb_mps + w.J1 * (g + gravity.gradient_w_ps2 * d / 2) + x.R_wb * m.dv_mps) - w.K * d;
@@ -50,43 +57,47 @@ template <EarthModel Earth>
 
 /// Covariance of the predicted state from that of `x` (both in the order of the state's axes, about their own states) and the motion's.
 template <EarthModel Earth>
-[[nodiscard]] NavigationCovariance predict_covariance(const NavigationState& x, const NavigationCovariance& covariance,
-                                                      const PreintegratedMotion<double>& motion, const ImuNoise& noise,
-                                                      const Earth& earth) {
-  using State = NavigationState;
-  using Matrix3 = Eigen::Matrix3d;
+[[nodiscard]] BasicNavigationCovariance<typename Earth::Scalar> predict_covariance(
+    const BasicNavigationState<typename Earth::Scalar>& x, const BasicNavigationCovariance<typename Earth::Scalar>& covariance,
+    const PreintegratedMotion<typename Earth::Scalar>& motion, const ImuNoise& noise, const Earth& earth) {
+  using Scalar = typename Earth::Scalar;
+  using State = BasicNavigationState<Scalar>;
+  using Covariance = BasicNavigationCovariance<Scalar>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+  using Matrix9 = Eigen::Matrix<Scalar, 9, 9>;
+  using Turn = BasicEarthTurn<Scalar>;
   constexpr int t = State::attitude, p = State::position, v = State::velocity, ba = State::accel_bias, bg = State::gyro_bias;
-  const double T = motion.duration_s;
-  EarthTurn w = EarthTurn::none(T);
-  if constexpr (Earth::rotates) w = EarthTurn::over(earth.rate_w_radps(), T);
+  const Scalar T = motion.duration_s;
+  Turn w = Turn::none(T);
+  if constexpr (Earth::rotates) w = Turn::over(earth.rate_w_radps(), T);
   const auto m = motion.corrected(bias_of(x));
   const Matrix3 Ct = w.C.transpose(), CtR = Ct * x.R_wb;
 
-  NavigationCovariance F = NavigationCovariance::Identity();
-  F.block<3, 3>(t, t) = m.dR.transpose();
-  F.block<3, 3>(t, bg) = so3::right_jacobian(m.turn_rad) * motion.d_R_d_gyro_bias;
-  F.block<3, 3>(p, t) = -CtR * so3::skew(m.dp_m);
-  F.block<3, 3>(p, v) = T * Ct;
-  F.block<3, 3>(p, ba) = CtR * motion.d_p_d_accel_bias;
-  F.block<3, 3>(p, bg) = CtR * motion.d_p_d_gyro_bias;
-  F.block<3, 3>(v, t) = -CtR * so3::skew(m.dv_mps) - w.K * F.block<3, 3>(p, t);
-  F.block<3, 3>(v, v) = Ct - w.K * F.block<3, 3>(p, v);
-  F.block<3, 3>(v, ba) = CtR * motion.d_v_d_accel_bias - w.K * F.block<3, 3>(p, ba);
-  F.block<3, 3>(v, bg) = CtR * motion.d_v_d_gyro_bias - w.K * F.block<3, 3>(p, bg);
+  Covariance F = Covariance::Identity();
+  F.template block<3, 3>(t, t) = m.dR.transpose();
+  F.template block<3, 3>(t, bg) = so3::right_jacobian(m.turn_rad) * motion.d_R_d_gyro_bias;
+  F.template block<3, 3>(p, t) = -CtR * so3::skew(m.dp_m);
+  F.template block<3, 3>(p, v) = T * Ct;
+  F.template block<3, 3>(p, ba) = CtR * motion.d_p_d_accel_bias;
+  F.template block<3, 3>(p, bg) = CtR * motion.d_p_d_gyro_bias;
+  F.template block<3, 3>(v, t) = -CtR * so3::skew(m.dv_mps) - w.K * F.template block<3, 3>(p, t);
+  F.template block<3, 3>(v, v) = Ct - w.K * F.template block<3, 3>(p, v);
+  F.template block<3, 3>(v, ba) = CtR * motion.d_v_d_accel_bias - w.K * F.template block<3, 3>(p, ba);
+  F.template block<3, 3>(v, bg) = CtR * motion.d_v_d_gyro_bias - w.K * F.template block<3, 3>(p, bg);
 
   // The motion's own errors, turned into axes of w at the end.
-  Eigen::Matrix<double, 9, 9> N = Eigen::Matrix<double, 9, 9>::Identity();
-  N.block<3, 3>(p, p) = CtR;
-  N.block<3, 3>(v, p) = -w.K * CtR;
-  N.block<3, 3>(v, v) = CtR;
+  Matrix9 N = Matrix9::Identity();
+  N.template block<3, 3>(p, p) = CtR;
+  N.template block<3, 3>(v, p) = -w.K * CtR;
+  N.template block<3, 3>(v, v) = CtR;
 
-  const NavigationCovariance FP = F.lazyProduct(covariance);
-  NavigationCovariance Q = FP.lazyProduct(F.transpose());
-  const Eigen::Matrix<double, 9, 9> NQ = N.lazyProduct(motion.covariance);
-  Q.topLeftCorner<9, 9>() += NQ.lazyProduct(N.transpose());
+  const Covariance FP = F.lazyProduct(covariance);
+  Covariance Q = FP.lazyProduct(F.transpose());
+  const Matrix9 NQ = N.lazyProduct(motion.covariance);
+  Q.template topLeftCorner<9, 9>() += NQ.lazyProduct(N.transpose());
   const double accel_walk = noise.accel_bias_walk_mps3_sqrt_hz, gyro_walk = noise.gyro_bias_walk_radps2_sqrt_hz;
-  Q.diagonal().segment<3>(ba).array() += accel_walk * accel_walk * T;
-  Q.diagonal().segment<3>(bg).array() += gyro_walk * gyro_walk * T;
+  Q.diagonal().template segment<3>(ba).array() += accel_walk * accel_walk * T;
+  Q.diagonal().template segment<3>(bg).array() += gyro_walk * gyro_walk * T;
   for (int j = 0; j < 15; ++j)
     for (int i = 0; i < j; ++i) Q(i, j) = Q(j, i) = (Q(i, j) + Q(j, i)) / 2;
   return Q;
