@@ -6,7 +6,8 @@
 ///     y = (N + h) cos(lat) sin(lon)
 ///     z = (N (1 - e^2) + h) sin(lat)
 ///
-/// Frame e is ECEF. Frame w is East-North-Up at an origin. R_ew maps w to e. Scalar of a position: double or wider.
+/// Frame e is ECEF. Frame w is East-North-Up at an origin. R_ew maps w to e.
+/// Positions have a Scalar, double or wider; geodetic coordinates are double.
 #pragma once
 
 #include <Eigen/Core>
@@ -41,9 +42,10 @@ template <class Scalar = double>
 /// centre itself gives latitude 0. On the axis longitude is 0.
 template <class Scalar = double>
 [[nodiscard]] Geodetic geodetic_from_ecef(const math::Vector3<Scalar>& p_e_m) {
-  const double rho = std::hypot(p_e_m.x(), p_e_m.y()), z = p_e_m.z();
+  const auto x = static_cast<double>(p_e_m.x()), y = static_cast<double>(p_e_m.y()), z = static_cast<double>(p_e_m.z());
+  const double rho = std::hypot(x, y);
   Geodetic g;
-  g.lon_rad = rho > 0 ? std::atan2(p_e_m.y(), p_e_m.x()) : 0.0;
+  g.lon_rad = rho > 0 ? std::atan2(y, x) : 0.0;
   if (rho == 0 && z == 0) {
     g.height_m = -kSemiMajorAxisM;
     return g;

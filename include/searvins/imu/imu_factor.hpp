@@ -48,6 +48,7 @@
 #include <searvins/imu/navigation_state.hpp>
 #include <searvins/imu/preintegrated_motion.hpp>
 #include <searvins/math/block_cholesky.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/math/so3.hpp>
 #include <searvins/smoother/factor.hpp>
 
@@ -55,17 +56,18 @@ namespace searvins::imu {
 
 /// R, upper triangular, with R' R = Q^-1 for a positive definite N x N matrix Q. Errors: not_positive_definite (index: the row), also for
 /// NaN.
-template <int N>
-[[nodiscard]] Result<Eigen::Matrix<double, N, N>> square_root_information(const Eigen::Matrix<double, N, N>& Q) {
+template <int N, class Scalar = double>
+[[nodiscard]] Result<math::Matrix<Scalar, N, N>> square_root_information(const math::Matrix<Scalar, N, N>& Q) {
   // Q = U U' with U upper is the Cholesky factor of Q with rows and columns reversed; R = U^-1.
-  Eigen::Matrix<double, N, N> L = Q.reverse();
-  const Eigen::Matrix<double, N, 1> reference = L.diagonal();
+  math::Matrix<Scalar, N, N> L = Q.reverse();
+  const math::Vector<Scalar, N> reference = L.diagonal();
   const auto report = math::partial_cholesky(L.data(), N, N, N, reference.data());
   if (!report.ok())
-    return failure(StatusCode::not_positive_definite, "covariance is not positive definite", N - 1 - report.failed, -1, report.value);
-  Eigen::Matrix<double, N, N> inverse = Eigen::Matrix<double, N, N>::Identity();
+    return failure(StatusCode::not_positive_definite, "covariance is not positive definite", N - 1 - report.failed, -1,
+                   static_cast<double>(report.value));
+  math::Matrix<Scalar, N, N> inverse = math::Matrix<Scalar, N, N>::Identity();
   for (int j = 0; j < N; ++j) math::solve_lower(L.data(), N, N, inverse.col(j).data());
-  return Eigen::Matrix<double, N, N>{inverse.reverse()};
+  return math::Matrix<Scalar, N, N>{inverse.reverse()};
 }
 
 /// See the file comment. Rows in the order of the state's axes: attitude, position, velocity, accelerometer bias, gyroscope bias.
@@ -95,7 +97,7 @@ struct ImuFactor {
     const double accel_walk = noise.accel_bias_walk_mps3_sqrt_hz, gyro_walk = noise.gyro_bias_walk_radps2_sqrt_hz;
     if (!(motion.duration_s > 0)) return failure(StatusCode::invalid_argument, "an inertial factor needs an interval of positive length");
     if (!(accel_walk > 0 && gyro_walk > 0)) return failure(StatusCode::invalid_argument, "densities of the bias walks must be positive");
-    const auto root = square_root_information<9>(motion.covariance);
+    const auto root = square_root_information<9, Scalar>(motion.covariance);
     if (!root) return root.status();
     const Scalar root_T = std::sqrt(motion.duration_s);
     return ImuFactor{from,

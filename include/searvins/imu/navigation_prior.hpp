@@ -57,7 +57,7 @@ struct BasicNavigationPriorFactor {
   /// From a covariance in the order of the state's axes. Errors: not_positive_definite.
   [[nodiscard]] static Result<BasicNavigationPriorFactor> make(const smoother::Key<State>& state, const State& mean,
                                                                const Matrix15& covariance) {
-    const auto root = square_root_information<15>(covariance);
+    const auto root = square_root_information<15, S>(covariance);
     if (!root) return root.status();
     return BasicNavigationPriorFactor{state, mean, *root};
   }

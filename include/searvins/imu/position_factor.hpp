@@ -40,10 +40,10 @@ struct BasicPositionFactor {
   robust::Huber<S> loss{2.5};
 
   /// `floor_m`: sigma that is added to every axis. Errors: not_positive_definite, also for NaN.
-  [[nodiscard]] static Result<BasicPositionFactor> make(const smoother::Key<State>& state, const Antenna& antenna, const Vector3& position_w_m,
-                                                        const Matrix3& covariance_w_m2, Scalar floor_m) {
+  [[nodiscard]] static Result<BasicPositionFactor> make(const smoother::Key<State>& state, const Antenna& antenna,
+                                                        const Vector3& position_w_m, const Matrix3& covariance_w_m2, Scalar floor_m) {
     const Matrix3 C = covariance_w_m2 + floor_m * floor_m * Matrix3::Identity();
-    const auto root = square_root_information<3>(C);
+    const auto root = square_root_information<3, S>(C);
     if (!root.ok()) return root.status();
     if (!position_w_m.allFinite()) return failure(StatusCode::non_finite, "position is not finite");
     BasicPositionFactor f;

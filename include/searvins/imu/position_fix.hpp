@@ -24,7 +24,7 @@ struct BasicPositionFix {
   int satellites{-1};  ///< -1: not known
   bool covariance_assumed{false};  ///< the source gave none: the covariance is a guess from the quality
   Vector3 velocity_e_mps{Vector3::Constant(std::numeric_limits<Scalar>::quiet_NaN())};  ///< ECEF; NaN: none
-  Scalar sigma_velocity_mps{0};                                                          ///< of each axis
+  Scalar sigma_velocity_mps{0};                                                         ///< of each axis
 
   [[nodiscard]] bool has_velocity() const { return velocity_e_mps.allFinite() && sigma_velocity_mps > 0; }
 };
