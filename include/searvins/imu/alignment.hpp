@@ -23,13 +23,18 @@
 #include <searvins/core/time.hpp>
 #include <searvins/imu/attitude_angles.hpp>
 #include <searvins/imu/imu_sample.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/math/so3.hpp>
 
 namespace searvins::imu {
 
 /// Mean and covariance of samples, by updates that neither store them nor cancel [Welford 1962; Chan, Golub, LeVeque 1983 to merge two].
-class RestStatistics {
+template <class Scalar>
+class BasicRestStatistics {
  public:
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+
   /// Takes a sample. Not finite: ignored.
   void add(const ImuSample& sample) {
     if (!sample.finite()) return;
@@ -41,12 +46,12 @@ class RestStatistics {
   }
 
   /// Takes what another has gathered.
-  void merge(const RestStatistics& other) {
+  void merge(const BasicRestStatistics& other) {
     if (other.count_ == 0) return;
     if (count_ == 0) return void(*this = other);
     const double n = static_cast<double>(count_), m = static_cast<double>(other.count_), total = n + m;
-    const auto join = [&](Eigen::Vector3d& mean, Eigen::Matrix3d& squares, const Eigen::Vector3d& mean2, const Eigen::Matrix3d& squares2) {
-      const Eigen::Vector3d d = mean2 - mean;
+    const auto join = [&](Vector3& mean, Matrix3& squares, const Vector3& mean2, const Matrix3& squares2) {
+      const Vector3 d = mean2 - mean;
       squares += squares2 + n * m / total * d * d.transpose();
       mean += m / total * d;
     };
@@ -63,26 +68,26 @@ class RestStatistics {
   [[nodiscard]] double duration_s() const { return count_ > 1 ? seconds_between(first_, last_) : 0.0; }
   [[nodiscard]] GpsTime first() const { return first_; }
   [[nodiscard]] GpsTime last() const { return last_; }
-  [[nodiscard]] const Eigen::Vector3d& mean_accel_b_mps2() const { return mean_accel_; }
-  [[nodiscard]] const Eigen::Vector3d& mean_gyro_b_radps() const { return mean_gyro_; }
+  [[nodiscard]] const Vector3& mean_accel_b_mps2() const { return mean_accel_; }
+  [[nodiscard]] const Vector3& mean_gyro_b_radps() const { return mean_gyro_; }
   /// Covariance of one sample; zero for fewer than two.
-  [[nodiscard]] Eigen::Matrix3d accel_covariance() const { return per_sample(accel_squares_); }
-  [[nodiscard]] Eigen::Matrix3d gyro_covariance() const { return per_sample(gyro_squares_); }
+  [[nodiscard]] Matrix3 accel_covariance() const { return per_sample(accel_squares_); }
+  [[nodiscard]] Matrix3 gyro_covariance() const { return per_sample(gyro_squares_); }
   /// Covariance of the means, see the file comment. Needs a duration.
-  [[nodiscard]] Eigen::Matrix3d mean_accel_covariance(const ImuNoise& noise) const { return of_mean(accel_covariance(), noise.accel_noise_mps2_sqrt_hz); }
-  [[nodiscard]] Eigen::Matrix3d mean_gyro_covariance(const ImuNoise& noise) const { return of_mean(gyro_covariance(), noise.gyro_noise_radps_sqrt_hz); }
+  [[nodiscard]] Matrix3 mean_accel_covariance(const ImuNoise& noise) const { return of_mean(accel_covariance(), noise.accel_noise_mps2_sqrt_hz); }
+  [[nodiscard]] Matrix3 mean_gyro_covariance(const ImuNoise& noise) const { return of_mean(gyro_covariance(), noise.gyro_noise_radps_sqrt_hz); }
 
  private:
-  void accumulate(const Eigen::Vector3d& x, Eigen::Vector3d& mean, Eigen::Matrix3d& squares) const {
-    const Eigen::Vector3d before = x - mean;
+  void accumulate(const Vector3& x, Vector3& mean, Matrix3& squares) const {
+    const Vector3 before = x - mean;
     mean += before / static_cast<double>(count_);
     squares += before * (x - mean).transpose();
   }
-  [[nodiscard]] Eigen::Matrix3d per_sample(const Eigen::Matrix3d& squares) const {
-    if (count_ < 2) return Eigen::Matrix3d::Zero();
+  [[nodiscard]] Matrix3 per_sample(const Matrix3& squares) const {
+    if (count_ < 2) return Matrix3::Zero();
     return (squares + squares.transpose()) / (2.0 * static_cast<double>(count_ - 1));
   }
-  [[nodiscard]] Eigen::Matrix3d of_mean(Eigen::Matrix3d sample, double density) const {
+  [[nodiscard]] Matrix3 of_mean(Matrix3 sample, double density) const {
     sample /= static_cast<double>(std::max(1L, count_));
     const double floor = density * density / std::max(duration_s(), 1e-3);
     for (int i = 0; i < 3; ++i) sample(i, i) = std::max(sample(i, i), floor);
@@ -91,15 +96,18 @@ class RestStatistics {
 
   long count_{0};
   GpsTime first_{}, last_{};
-  Eigen::Vector3d mean_accel_{Eigen::Vector3d::Zero()}, mean_gyro_{Eigen::Vector3d::Zero()};
-  Eigen::Matrix3d accel_squares_{Eigen::Matrix3d::Zero()}, gyro_squares_{Eigen::Matrix3d::Zero()};
+  Vector3 mean_accel_{Vector3::Zero()}, mean_gyro_{Vector3::Zero()};
+  Matrix3 accel_squares_{Matrix3::Zero()}, gyro_squares_{Matrix3::Zero()};
 };
+using RestStatistics = BasicRestStatistics<double>;
 
 /// Axes right, forward (of a heading), up over an up direction: the attitude of a body that stands upright on it.
-[[nodiscard]] inline Eigen::Matrix3d upright_axes(const Eigen::Vector3d& up_w, double heading_rad) {
-  const Eigen::Vector3d u = up_w.normalized();
-  const Eigen::Vector3d f = Eigen::Vector3d{std::sin(heading_rad), std::cos(heading_rad), 0};
-  Eigen::Matrix3d R;
+template <class Scalar = double>
+[[nodiscard]] math::Matrix3<Scalar> upright_axes(const math::Vector3<Scalar>& up_w, double heading_rad) {
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  const Vector3 u = up_w.normalized();
+  const Vector3 f = Vector3{std::sin(heading_rad), std::cos(heading_rad), 0};
+  Eigen::Matrix<Scalar, 3, 3> R;
   R.col(2) = u;
   R.col(1) = (f - f.dot(u) * u).normalized();
   R.col(0) = R.col(1).cross(u);
@@ -110,34 +118,39 @@ class RestStatistics {
 /// forward axis on a cone: y = c s + sqrt(1 - c^2) (cos t f + sin t r) with s the force's direction and c its share of the forward axis. The heading
 /// is met where y has no part to the right of it: A cos t + B sin t = C, solved in closed form.
 /// Errors: non_finite; invalid_argument (force below 3 m/s^2, or so far from vertical in b that the forward axis has no heading): value = its size.
-[[nodiscard]] inline Result<Eigen::Matrix3d> attitude_from_force(const Eigen::Vector3d& force_b_mps2, const Eigen::Vector3d& force_w_mps2, double heading_rad) {
+template <class Scalar = double>
+[[nodiscard]] Result<math::Matrix3<Scalar>> attitude_from_force(const math::Vector3<Scalar>& force_b_mps2,
+                                                                const math::Vector3<Scalar>& force_w_mps2, double heading_rad) {
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
   if (!force_b_mps2.allFinite() || !force_w_mps2.allFinite() || !std::isfinite(heading_rad))
     return failure(StatusCode::non_finite, "specific force or heading is not finite");
   if (force_b_mps2.norm() < 3 || force_w_mps2.norm() < 3)
     return failure(StatusCode::invalid_argument, "the specific force is too small to level by: is gravity in it, and in m/s^2?", -1, -1, force_b_mps2.norm());
-  const Eigen::Vector3d u_b = force_b_mps2.normalized(), u_w = force_w_mps2.normalized();
+  const Vector3 u_b = force_b_mps2.normalized(), u_w = force_w_mps2.normalized();
   if (std::abs(u_b.y()) > 0.99) return failure(StatusCode::invalid_argument, "the forward axis points along gravity: it has no heading", -1, -1, u_b.y());
-  Eigen::Matrix3d upright_b;  // right, forward, up over u_b, in axes of b
+  Matrix3 upright_b;  // right, forward, up over u_b, in axes of b
   upright_b.col(2) = u_b;
-  upright_b.col(1) = (Eigen::Vector3d::UnitY() - u_b.y() * u_b).normalized();
+  upright_b.col(1) = (Vector3::UnitY() - u_b.y() * u_b).normalized();
   upright_b.col(0) = upright_b.col(1).cross(u_b);
-  const Eigen::Matrix3d upright_w = upright_axes(u_w, heading_rad);
-  const Eigen::Vector3d right_w{std::cos(heading_rad), -std::sin(heading_rad), 0};
+  const Matrix3 upright_w = upright_axes<Scalar>(u_w, heading_rad);
+  const Vector3 right_w{std::cos(heading_rad), -std::sin(heading_rad), 0};
   const double A = upright_w.col(1).dot(right_w), B = upright_w.col(0).dot(right_w), C = -u_b.y() / std::sqrt(1 - u_b.y() * u_b.y()) * u_w.dot(right_w);
   const double size = std::hypot(A, B);
   if (!(std::abs(C) < size)) return failure(StatusCode::invalid_argument, "no attitude has this heading under this specific force", -1, -1, C);
   const double middle = std::atan2(B, A), aside = std::acos(C / size), plus = wrapped(middle + aside), minus = wrapped(middle - aside);
   const double t = std::abs(plus) < std::abs(minus) ? plus : minus;  // the other one points backwards
-  Eigen::Matrix3d turned_w = upright_w;
+  Matrix3 turned_w = upright_w;
   turned_w.col(1) = std::cos(t) * upright_w.col(1) + std::sin(t) * upright_w.col(0);
   turned_w.col(0) = turned_w.col(1).cross(u_w);
-  return Eigen::Matrix3d{turned_w * upright_b.transpose()};
+  return Matrix3{turned_w * upright_b.transpose()};
 }
 
 /// cov(d) of the file comment. `force_covariance` is that of the specific force: noise of the mean and bias.
-[[nodiscard]] inline Eigen::Matrix3d attitude_covariance(const Eigen::Vector3d& up_b, const Eigen::Matrix3d& force_covariance, double gravity_mps2,
-                                                         double sigma_heading_rad) {
-  const Eigen::Matrix3d U = so3::skew(up_b);
+template <class Scalar = double>
+[[nodiscard]] math::Matrix3<Scalar> attitude_covariance(const math::Vector3<Scalar>& up_b, const math::Matrix3<Scalar>& force_covariance,
+                                                        double gravity_mps2, double sigma_heading_rad) {
+  const Eigen::Matrix<Scalar, 3, 3> U = so3::skew(up_b);
   return U * force_covariance * U.transpose() / (gravity_mps2 * gravity_mps2) + sigma_heading_rad * sigma_heading_rad * up_b * up_b.transpose();
 }
 
@@ -153,22 +166,26 @@ struct RestAlignment {
 /// Aligns from a rest. `gravity_w_mps2` is that of the position, `earth_rate_w_radps` the Earth's in w (zero where it is not known: its size is then for
 /// the caller to add to the bias' sigma). A heading that is not known is passed with a sigma of pi.
 /// Errors: too_few (under 10 samples); those of attitude_from_force; rejected: the mean is not gravity's size to within 10 %: value = |mean|.
-[[nodiscard]] inline Result<RestAlignment> align_at_rest(const RestStatistics& rest, const ImuNoise& noise, const Eigen::Vector3d& gravity_w_mps2,
-                                                         const Eigen::Vector3d& earth_rate_w_radps, double heading_rad, double sigma_heading_rad) {
+template <class Scalar>
+[[nodiscard]] Result<RestAlignment> align_at_rest(const BasicRestStatistics<Scalar>& rest, const ImuNoise& noise,
+                                                  const math::Vector3<Scalar>& gravity_w_mps2, const math::Vector3<Scalar>& earth_rate_w_radps,
+                                                  double heading_rad, double sigma_heading_rad) {
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
   if (rest.count() < 10) return failure(StatusCode::too_few, "fewer than 10 samples at rest", static_cast<std::int32_t>(rest.count()), 10);
   const double g = gravity_w_mps2.norm(), f = rest.mean_accel_b_mps2().norm();
-  const Result<Eigen::Matrix3d> R_wb = attitude_from_force(rest.mean_accel_b_mps2(), -gravity_w_mps2, heading_rad);
+  const Result<Matrix3> R_wb = attitude_from_force<Scalar>(rest.mean_accel_b_mps2(), -gravity_w_mps2, heading_rad);
   if (!R_wb.ok()) return R_wb.status();
   if (std::abs(f - g) > 0.1 * g) return failure(StatusCode::rejected, "the specific force at rest is not gravity: wrong unit, or not at rest", -1, -1, f);
   RestAlignment a;
   a.R_wb = *R_wb;
-  const Eigen::Vector3d up_b = rest.mean_accel_b_mps2() / f, earth_b = a.R_wb.transpose() * earth_rate_w_radps;
+  const Vector3 up_b = rest.mean_accel_b_mps2() / f, earth_b = R_wb->transpose() * earth_rate_w_radps;
   const double bias_variance = noise.accel_bias_sigma_mps2 * noise.accel_bias_sigma_mps2;
-  const Eigen::Matrix3d bias = bias_variance * Eigen::Matrix3d::Identity();
-  a.attitude_covariance = attitude_covariance(up_b, rest.mean_accel_covariance(noise) + bias, g, sigma_heading_rad);
+  const Matrix3 bias = bias_variance * Matrix3::Identity();
+  a.attitude_covariance = attitude_covariance<Scalar>(up_b, rest.mean_accel_covariance(noise) + bias, g, sigma_heading_rad);
   a.attitude_accel_bias = bias_variance / g * so3::skew(up_b);
   a.gyro_bias_b_radps = rest.mean_gyro_b_radps() - earth_b;
-  const Eigen::Matrix3d E = so3::skew(earth_b);
+  const Matrix3 E = so3::skew(earth_b);
   a.gyro_bias_covariance = rest.mean_gyro_covariance(noise) + E * a.attitude_covariance * E.transpose();
   return a;
 }

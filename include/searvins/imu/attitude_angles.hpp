@@ -16,6 +16,8 @@
 #include <cmath>
 #include <numbers>
 
+#include <searvins/math/deferred.hpp>
+
 namespace searvins::imu {
 
 /// Radians, each in [-pi, pi], pitch in [-pi/2, pi/2].
@@ -38,10 +40,11 @@ struct AttitudeAngles {
 }
 
 /// Attitude of angles.
-[[nodiscard]] inline Eigen::Matrix3d R_wb_from(const AttitudeAngles& a) {
+template <class Scalar = double>
+[[nodiscard]] math::Matrix3<Scalar> R_wb_from(const AttitudeAngles& a) {
   const double sr = std::sin(a.roll_rad), cr = std::cos(a.roll_rad), sp = std::sin(a.pitch_rad), cp = std::cos(a.pitch_rad);
   const double sh = std::sin(a.heading_rad), ch = std::cos(a.heading_rad);
-  Eigen::Matrix3d R_wb;  // columns: right, forward, up of the body in east, north, up
+  math::Matrix3<Scalar> R_wb;  // columns: right, forward, up of the body in east, north, up
   R_wb << sh * sp * sr + ch * cr, sh * cp, -sh * sp * cr + ch * sr,  //
       ch * sp * sr - sh * cr, ch * cp, -ch * sp * cr - sh * sr,      //
       -cp * sr, sp, cp * cr;
