@@ -99,8 +99,9 @@ struct InitializerSettings {
 };
 
 /// What an alignment is: the state, and its covariance in the tangent order of NavigationState.
-struct Alignment {
-  using Covariance = Eigen::Matrix<double, NavigationState::dof, NavigationState::dof>;
+template <class Scalar>
+struct BasicAlignment {
+  using Covariance = Eigen::Matrix<Scalar, NavigationState::dof, NavigationState::dof>;
   GpsTime time{};
   NavigationState state{};
   Covariance covariance{Covariance::Identity()};
@@ -109,16 +110,21 @@ struct Alignment {
   bool reversed{false};   ///< the vehicle was in reverse gear when its heading was found
 
   /// Sigma of each tangent axis.
-  [[nodiscard]] NavigationState::Step sigmas() const { return covariance.diagonal().cwiseSqrt(); }
+  [[nodiscard]] Eigen::Matrix<Scalar, NavigationState::dof, 1> sigmas() const { return covariance.diagonal().cwiseSqrt(); }
 };
+using Alignment = BasicAlignment<double>;
 
 /// See the file comment.
-class Initializer {
+template <class Scalar>
+class BasicInitializer {
  public:
-  explicit Initializer(const InitializerSettings& settings = {}) : settings_(settings) { restart(); }
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+
+  explicit BasicInitializer(const InitializerSettings& settings = {}) : settings_(settings) { restart(); }
 
   /// Gravity and the rate of the Earth at the position, in w. Both can be set again at any time. Errors: non_finite, invalid_argument (size).
-  Status set_local_gravity(const Eigen::Vector3d& gravity_w_mps2, const Eigen::Vector3d& earth_rate_w_radps) {
+  Status set_local_gravity(const Vector3& gravity_w_mps2, const Vector3& earth_rate_w_radps) {
     if (!gravity_w_mps2.allFinite() || !earth_rate_w_radps.allFinite()) return failure(StatusCode::non_finite, "gravity or Earth rate is not finite");
     const double g = gravity_w_mps2.norm();
     if (g < 9 || g > 10.5) return failure(StatusCode::invalid_argument, "gravity must be a vector of about 9.8 m/s^2 that points down", -1, -1, g);
@@ -137,7 +143,8 @@ class Initializer {
     const double dt_s = last_ ? seconds_between(last_->time, sample.time) : 0.0;
     const ImuSample before = last_ ? *last_ : sample;
     last_ = sample;
-    const Eigen::Vector3d gyro = (before.gyro_b_radps + sample.gyro_b_radps) / 2, accel = (before.accel_b_mps2 + sample.accel_b_mps2) / 2;
+    const Vector3 gyro_before = before.gyro_b_radps, accel_before = before.accel_b_mps2;
+    const Vector3 gyro = (gyro_before + sample.gyro_b_radps) / 2, accel = (accel_before + sample.accel_b_mps2) / 2;
     integrate_interval(gyro, accel, dt_s);
     if (!has_gravity_) {  // a rest before the first position counts
       if (at_rest)
@@ -155,7 +162,7 @@ class Initializer {
   }
 
   /// Takes the antenna's velocity in w and the sigma of each axis. Errors: non_finite, invalid_argument (sigma), stale (not near the last sample).
-  Status add_velocity(GpsTime time, const Eigen::Vector3d& v_w_mps, double sigma_mps) {
+  Status add_velocity(GpsTime time, const Vector3& v_w_mps, double sigma_mps) {
     if (!v_w_mps.allFinite() || !std::isfinite(sigma_mps)) return failure(StatusCode::non_finite, "velocity is not finite");
     if (!(sigma_mps > 0)) return failure(StatusCode::invalid_argument, "the sigma of a velocity is positive", -1, -1, sigma_mps);
     if (!last_ || std::abs(seconds_between(time, last_->time)) > settings_.velocity_life_s)
@@ -166,7 +173,7 @@ class Initializer {
   }
 
   /// Takes the antenna's position in w and the sigma of each horizontal axis; worth passing when it is RTK. Errors: non_finite, invalid_argument, stale.
-  Status add_position(GpsTime time, const Eigen::Vector3d& p_w_m, double sigma_m) {
+  Status add_position(GpsTime time, const Vector3& p_w_m, double sigma_m) {
     if (!p_w_m.allFinite() || !std::isfinite(sigma_m)) return failure(StatusCode::non_finite, "position is not finite");
     if (!(sigma_m > 0)) return failure(StatusCode::invalid_argument, "the sigma of a position is positive", -1, -1, sigma_m);
     if (!last_ || std::abs(seconds_between(time, last_->time)) > settings_.velocity_life_s)
@@ -205,18 +212,18 @@ class Initializer {
   [[nodiscard]] double sigma_heading_rad() const { return state_ == AlignmentState::aligned ? std::sqrt(heading_variance_) : std::numbers::pi; }
   [[nodiscard]] HeadingSource heading_source() const { return source_; }
   /// Attitude in the level frame l, whose heading means nothing until aligned() - then it is R_wb.
-  [[nodiscard]] const Eigen::Matrix3d& R_lb() const { return R_lb_; }
-  [[nodiscard]] const Eigen::Vector3d& gyro_bias_b_radps() const { return gyro_bias_; }
+  [[nodiscard]] const Matrix3& R_lb() const { return R_lb_; }
+  [[nodiscard]] const Vector3& gyro_bias_b_radps() const { return gyro_bias_; }
 
   /// The state at the last sample, once aligned. The caller gives the antenna's position in w and its covariance. The velocity is zero at rest, else the
   /// last one given while it is younger than its life, else zero with a sigma of 20 m/s. Errors: under_determined (not aligned), non_finite.
-  [[nodiscard]] Result<Alignment> alignment(const Eigen::Vector3d& antenna_w_m, const Eigen::Matrix3d& covariance_w_m2) const {
+  [[nodiscard]] Result<BasicAlignment<Scalar>> alignment(const Vector3& antenna_w_m, const Matrix3& covariance_w_m2) const {
     if (state_ != AlignmentState::aligned) return failure(StatusCode::under_determined, waiting_text());
     if (!antenna_w_m.allFinite() || !covariance_w_m2.allFinite()) return failure(StatusCode::non_finite, "position or covariance is not finite");
-    Alignment a;
+    BasicAlignment<Scalar> a;
     a.time = last_->time;
     a.heading_source = source_, a.from_rest = from_rest_, a.reversed = reversed_;
-    NavigationState& x = a.state;
+    auto& x = a.state;
     x.R_wb = R_lb_;
     x.p_wb_m = antenna_w_m - x.R_wb * settings_.lever_arm_b_m;
     x.gyro_bias_b_radps = gyro_bias_;
@@ -235,13 +242,13 @@ class Initializer {
  private:
   struct Velocity {
     GpsTime time{};
-    Eigen::Vector3d v_w{Eigen::Vector3d::Zero()};
+    Vector3 v_w{Vector3::Zero()};
     double sigma{0};
   };
   /// Half a second of a rest, and how the body turned in it.
   struct Block {
-    RestStatistics statistics{};
-    Eigen::Vector3d turn_b{Eigen::Vector3d::Zero()};  ///< integral of the gyroscope
+    BasicRestStatistics<Scalar> statistics{};
+    Vector3 turn_b{Vector3::Zero()};  ///< integral of the gyroscope
     double duration_s{0};
   };
 
@@ -254,7 +261,7 @@ class Initializer {
     end_rest();
     start_interval();
     gyro_bias_.setZero();
-    gyro_bias_covariance_ = settings_.noise.gyro_bias_sigma_radps * settings_.noise.gyro_bias_sigma_radps * Eigen::Matrix3d::Identity();
+    gyro_bias_covariance_ = settings_.noise.gyro_bias_sigma_radps * settings_.noise.gyro_bias_sigma_radps * Matrix3::Identity();
     from_rest_ = reversed_ = knows_gear_ = false;
     attitude_accel_bias_l_.setZero();
     since_rest_s_ = 0;
@@ -268,16 +275,16 @@ class Initializer {
     interval_force_b_.setZero();
     interval_velocity_.reset();
   }
-  void integrate_interval(const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel, double dt_s) {
-    const Eigen::Matrix3d half = so3::exp((gyro - gyro_bias_) * (dt_s / 2));  // the mean of two readings belongs to the middle
-    const Eigen::Vector3d middle = half.transpose() * interval_force_b_ + accel * dt_s;
+  void integrate_interval(const Vector3& gyro, const Vector3& accel, double dt_s) {
+    const Matrix3 half = so3::exp((gyro - gyro_bias_) * (dt_s / 2));  // the mean of two readings belongs to the middle
+    const Vector3 middle = half.transpose() * interval_force_b_ + accel * dt_s;
     interval_force_b_ = half.transpose() * middle;
     interval_s_ += dt_s;
   }
 
   // Rest.
   /// True when the sums of the rest have grown.
-  bool gather(const ImuSample& sample, const Eigen::Vector3d& gyro, double dt_s) {
+  bool gather(const ImuSample& sample, const Vector3& gyro, double dt_s) {
     if (resting_) newest_.turn_b += gyro * dt_s, newest_.duration_s += dt_s;
     resting_ = true;
     newest_.statistics.add(sample);
@@ -293,7 +300,7 @@ class Initializer {
     held_ = newest_ = {};
   }
 
-  void rest(const ImuSample& sample, const Eigen::Vector3d& gyro, double dt_s) {
+  void rest(const ImuSample& sample, const Vector3& gyro, double dt_s) {
     const bool grown = gather(sample, gyro, dt_s);
     since_rest_s_ = 0;
     velocity_l_.setZero();
@@ -309,15 +316,15 @@ class Initializer {
     const bool aligned = state_ == AlignmentState::aligned;
     const double heading = state_ == AlignmentState::collecting ? 0.0 : heading_of(R_lb_);
     // Without a heading only the vertical part of the Earth's rate is known in b.
-    const Eigen::Vector3d up_w = -gravity_w_.normalized();
-    const Eigen::Vector3d up_l = aligned ? up_w : Eigen::Vector3d::UnitZ();
-    const Eigen::Vector3d earth_l = aligned ? earth_w_ : Eigen::Vector3d{earth_w_.dot(up_w) * up_l};
+    const Vector3 up_w = -gravity_w_.normalized();
+    const Vector3 up_l = aligned ? up_w : Vector3::UnitZ();
+    const Vector3 earth_l = aligned ? earth_w_ : Vector3{earth_w_.dot(up_w) * up_l};
     const Result<RestAlignment> a = align_at_rest(rest_, settings_.noise, -gravity_w_.norm() * up_l, earth_l, heading, 0);
     if (!a.ok()) return;
     R_lb_ = a->R_wb;
     gyro_bias_ = a->gyro_bias_b_radps;
     const double unknown = aligned ? 0.0 : horizontal_earth_rate();
-    gyro_bias_covariance_ = a->gyro_bias_covariance + unknown * unknown * Eigen::Matrix3d::Identity();
+    gyro_bias_covariance_ = a->gyro_bias_covariance + unknown * unknown * Matrix3::Identity();
     tilt_variance_ = a->attitude_covariance.trace() / 2;
     attitude_accel_bias_l_ = R_lb_ * a->attitude_accel_bias;
     rest_R_lb_ = R_lb_;
@@ -327,7 +334,7 @@ class Initializer {
   }
 
   // Motion.
-  void move(const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel, double dt_s) {
+  void move(const Vector3& gyro, const Vector3& accel, double dt_s) {
     if (resting_ && levelled_in_rest_) {  // the blocks that were held back may have turned already
       const double held_s = held_.duration_s + newest_.duration_s;
       R_lb_ = R_lb_ * so3::exp(held_.turn_b + newest_.turn_b - held_s * gyro_bias_);
@@ -336,19 +343,19 @@ class Initializer {
     turn(gyro, dt_s);
     since_rest_s_ += dt_s;
     if (since_rest_s_ > settings_.gear_memory_s) knows_gear_ = false;
-    const Eigen::Vector3d down_l = state_ == AlignmentState::aligned ? Eigen::Vector3d{gravity_w_} : Eigen::Vector3d{0, 0, -gravity_w_.norm()};
+    const Vector3 down_l = state_ == AlignmentState::aligned ? Vector3{gravity_w_} : Vector3{0, 0, -gravity_w_.norm()};
     velocity_l_ += (R_lb_ * accel + down_l) * dt_s;
   }
 
-  void turn(const Eigen::Vector3d& gyro, double dt_s) {
+  void turn(const Vector3& gyro, double dt_s) {
     if (state_ == AlignmentState::collecting) return;
-    const Eigen::Vector3d earth_b = state_ == AlignmentState::aligned ? Eigen::Vector3d{R_lb_.transpose() * earth_w_} : Eigen::Vector3d::Zero();
+    const Vector3 earth_b = state_ == AlignmentState::aligned ? Vector3{R_lb_.transpose() * earth_w_} : Vector3::Zero();
     R_lb_ = R_lb_ * so3::exp((gyro - gyro_bias_ - earth_b) * dt_s);
     if (place_) place_->track(heading_of(R_lb_), dt_s);
   }
 
   [[nodiscard]] double horizontal_earth_rate() const {
-    const Eigen::Vector3d up_w = -gravity_w_.normalized();
+    const Vector3 up_w = -gravity_w_.normalized();
     return (earth_w_ - earth_w_.dot(up_w) * up_w).norm();
   }
   [[nodiscard]] double seconds_since_level() const { return last_ ? std::max(0.0, seconds_between(level_time_, last_->time)) : 0.0; }
@@ -360,11 +367,11 @@ class Initializer {
   }
 
   /// Levels by the interval's force, which is `force_w` in w but for the change of velocity, whose sigma is given. With a heading l becomes w.
-  void level_from_interval(const Eigen::Vector3d& force_w, const std::optional<HeadingEstimate>& heading, double sigma_change_mps) {
-    const Eigen::Vector3d mean_b = interval_force_b_ / interval_s_;
+  void level_from_interval(const Vector3& force_w, const std::optional<HeadingEstimate>& heading, double sigma_change_mps) {
+    const Vector3 mean_b = interval_force_b_ / interval_s_;
     const double g = gravity_w_.norm(), heading_l = heading ? heading->heading_rad : state_ == AlignmentState::collecting ? 0.0 : heading_of(R_lb_);
-    const Eigen::Vector3d target = heading ? force_w : Eigen::Vector3d{0, 0, g};
-    const Result<Eigen::Matrix3d> R = attitude_from_force(mean_b, target, heading_l);
+    const Vector3 target = heading ? force_w : Vector3{0, 0, g};
+    const Result<Matrix3> R = attitude_from_force<Scalar>(mean_b, target, heading_l);
     if (!R.ok()) return;
     const double bias = settings_.noise.gyro_bias_sigma_radps * interval_s_ / 2, force = sigma_change_mps / interval_s_;
     const double variance = (force * force + settings_.noise.accel_bias_sigma_mps2 * settings_.noise.accel_bias_sigma_mps2) / (g * g) + bias * bias;
@@ -384,10 +391,10 @@ class Initializer {
   }
 
   // Heading.
-  void use_velocity(GpsTime time, const Eigen::Vector3d& v_w, double sigma) {
+  void use_velocity(GpsTime time, const Vector3& v_w, double sigma) {
     const double speed = std::hypot(v_w.x(), v_w.y());
     if (interval_velocity_ && interval_s_ >= settings_.moving_interval_s && !from_rest_) {
-      const Eigen::Vector3d force_w = (v_w - interval_velocity_->v_w) / interval_s_ - gravity_w_;
+      const Vector3 force_w = (v_w - interval_velocity_->v_w) / interval_s_ - gravity_w_;
       const double change = std::hypot(sigma, interval_velocity_->sigma);
       if (speed >= settings_.min_speed_unknown_gear_mps && state_ == AlignmentState::collecting) {
         const HeadingEstimate course{course_of(v_w), 0};
@@ -403,11 +410,11 @@ class Initializer {
     if (state_ == AlignmentState::levelled) use_course(time, v_w, sigma, speed);
   }
 
-  void use_course(GpsTime time, const Eigen::Vector3d& v_w, double sigma, double speed) {
+  void use_course(GpsTime time, const Vector3& v_w, double sigma, double speed) {
     const int gear = direction_of_travel();
     if (speed < (gear != 0 ? settings_.min_speed_mps : settings_.min_speed_unknown_gear_mps)) return void(heading_wait_ = AlignmentWait::heading_speed);
-    const Eigen::Matrix3d level_b = upright_axes(Eigen::Vector3d::UnitZ(), heading_of(R_lb_)).transpose() * R_lb_;
-    const Eigen::Vector3d rate = level_b * (last_->gyro_b_radps - gyro_bias_);
+    const Matrix3 level_b = upright_axes<Scalar>(Vector3::UnitZ(), heading_of(R_lb_)).transpose() * R_lb_;
+    const Vector3 rate = level_b * (last_->gyro_b_radps - gyro_bias_);
     if (std::abs(rate.z()) > settings_.max_rate_radps) return void(heading_wait_ = AlignmentWait::heading_straight);
     HeadingEstimate h = heading_from_velocity(v_w, sigma, rate, (gear < 0 ? -1.0 : 1.0) * (level_b * settings_.lever_arm_b_m), settings_.course);
     const double age_s = seconds_between(time, last_->time);
@@ -424,19 +431,20 @@ class Initializer {
     return forward > doubt ? 1 : forward < -doubt ? -1 : 0;
   }
 
-  void use_position(const Eigen::Vector3d& p_w, double sigma) {
+  void use_position(const Vector3& p_w, double sigma) {
     const double turned = place_ ? place_->most_turn : 0.0;
     if (!place_ || turned > settings_.max_turn_rad) {
       if (place_) heading_wait_ = AlignmentWait::heading_straight;
       return void(place_ = Place{p_w, sigma, heading_of(R_lb_)});
     }
-    const Eigen::Vector3d d = p_w - place_->p_w;
+    const Vector3 d = p_w - place_->p_w;
     const double both = std::hypot(sigma, place_->sigma);
     if (std::hypot(d.x(), d.y()) < std::max(settings_.min_displacement_m, 8 * both)) return;
     const int gear = direction_of_travel();
-    if (gear == 0 && !(velocity_ && velocity_->v_w.head<2>().norm() > settings_.min_speed_unknown_gear_mps))
+    if (gear == 0 && !(velocity_ && velocity_->v_w.template head<2>().norm() > settings_.min_speed_unknown_gear_mps))
       return void(heading_wait_ = AlignmentWait::heading_speed);
-    HeadingEstimate h = heading_from_displacement(d, both, turned, settings_.lever_arm_b_m.norm(), settings_.course);
+    const Vector3 lever_arm_b_m = settings_.lever_arm_b_m;
+    HeadingEstimate h = heading_from_displacement(d, both, turned, lever_arm_b_m.norm(), settings_.course);
     if (gear < 0) h.heading_rad += std::numbers::pi;
     const double mean_l = place_->heading_l + place_->mean_turn();
     place_ = Place{p_w, sigma, heading_of(R_lb_)};
@@ -468,12 +476,12 @@ class Initializer {
   /// Turns l into w: about the up axis of w.
   void become_aligned(double turn_rad, double sigma_rad, HeadingSource source) {
     if (state_ == AlignmentState::aligned) return;
-    const Eigen::Matrix3d R_wl = upright_axes(-gravity_w_, turn_rad);
+    const Matrix3 R_wl = upright_axes<Scalar>(-gravity_w_, turn_rad);
     R_lb_ = R_wl * R_lb_;
     rest_R_lb_ = R_wl * rest_R_lb_;
     attitude_accel_bias_l_ = R_wl * attitude_accel_bias_l_;
     if (from_rest_) {  // the horizontal part of the Earth's rate was not known in the rest
-      const Eigen::Vector3d up_w = -gravity_w_.normalized();
+      const Vector3 up_w = -gravity_w_.normalized();
       gyro_bias_ -= rest_R_lb_.transpose() * (earth_w_ - earth_w_.dot(up_w) * up_w);
     }
     velocity_l_ = R_wl * velocity_l_;
@@ -484,30 +492,31 @@ class Initializer {
     state_ = AlignmentState::aligned;
   }
 
-  void fill_covariance(Alignment& a, const Eigen::Matrix3d& position, double sigma_v) const {
-    Alignment::Covariance& C = a.covariance;
-    const Eigen::Vector3d up_b = -(a.state.R_wb.transpose() * gravity_w_).normalized();
-    const Eigen::Matrix3d vertical = up_b * up_b.transpose();
+  void fill_covariance(BasicAlignment<Scalar>& a, const Matrix3& position, double sigma_v) const {
+    typename BasicAlignment<Scalar>::Covariance& C = a.covariance;
+    const Vector3 up_b = -(a.state.R_wb.transpose() * gravity_w_).normalized();
+    const Matrix3 vertical = up_b * up_b.transpose();
     const double tilt = sigma_tilt_rad(), bias = settings_.noise.accel_bias_sigma_mps2;
-    const Eigen::Matrix3d attitude = tilt * tilt * (Eigen::Matrix3d::Identity() - vertical) + heading_variance_ * vertical;
-    const Eigen::Matrix3d arm = -a.state.R_wb * so3::skew(settings_.lever_arm_b_m);  // d p_wa / d attitude; p_wb = p_wa - R l
+    const Matrix3 attitude = tilt * tilt * (Matrix3::Identity() - vertical) + heading_variance_ * vertical;
+    const Vector3 lever_arm_b_m = settings_.lever_arm_b_m;
+    const Matrix3 arm = -a.state.R_wb * so3::skew(lever_arm_b_m);  // d p_wa / d attitude; p_wb = p_wa - R l
     C.setZero();
-    C.block<3, 3>(0, 0) = attitude;
-    C.block<3, 3>(3, 0) = -arm * attitude;
-    C.block<3, 3>(0, 3) = C.block<3, 3>(3, 0).transpose();
-    C.block<3, 3>(3, 3) = position + arm * attitude * arm.transpose();
-    C.block<3, 3>(6, 6) = sigma_v * sigma_v * Eigen::Matrix3d::Identity();
-    C.block<3, 3>(9, 9) = bias * bias * Eigen::Matrix3d::Identity();
-    C.block<3, 3>(0, 9) = a.state.R_wb.transpose() * attitude_accel_bias_l_;
-    C.block<3, 3>(9, 0) = C.block<3, 3>(0, 9).transpose();
-    C.block<3, 3>(3, 9) = -arm * C.block<3, 3>(0, 9);
-    C.block<3, 3>(9, 3) = C.block<3, 3>(3, 9).transpose();
-    C.block<3, 3>(12, 12) = gyro_bias_covariance_;
+    C.template block<3, 3>(0, 0) = attitude;
+    C.template block<3, 3>(3, 0) = -arm * attitude;
+    C.template block<3, 3>(0, 3) = C.template block<3, 3>(3, 0).transpose();
+    C.template block<3, 3>(3, 3) = position + arm * attitude * arm.transpose();
+    C.template block<3, 3>(6, 6) = sigma_v * sigma_v * Matrix3::Identity();
+    C.template block<3, 3>(9, 9) = bias * bias * Matrix3::Identity();
+    C.template block<3, 3>(0, 9) = a.state.R_wb.transpose() * attitude_accel_bias_l_;
+    C.template block<3, 3>(9, 0) = C.template block<3, 3>(0, 9).transpose();
+    C.template block<3, 3>(3, 9) = -arm * C.template block<3, 3>(0, 9);
+    C.template block<3, 3>(9, 3) = C.template block<3, 3>(3, 9).transpose();
+    C.template block<3, 3>(12, 12) = gyro_bias_covariance_;
   }
 
   /// Where a displacement began, and how the heading went since.
   struct Place {
-    Eigen::Vector3d p_w{Eigen::Vector3d::Zero()};
+    Vector3 p_w{Vector3::Zero()};
     double sigma{0}, heading_l{0};
     double most_turn{0}, turn_seconds{0}, seconds{0};
     void track(double heading, double dt_s) {
@@ -524,23 +533,24 @@ class Initializer {
   AlignmentWait heading_wait_{AlignmentWait::heading_source};
   HeadingSource source_{HeadingSource::none};
   bool has_gravity_{false}, resting_{false}, levelled_in_rest_{false}, from_rest_{false}, reversed_{false}, knows_gear_{false};
-  Eigen::Vector3d gravity_w_{0, 0, -9.8}, earth_w_{Eigen::Vector3d::Zero()};
+  Vector3 gravity_w_{0, 0, -9.8}, earth_w_{Vector3::Zero()};
   std::optional<ImuSample> last_;
   std::optional<Velocity> velocity_, interval_velocity_;
   std::optional<HeadingEstimate> candidate_, given_;
   std::optional<Place> place_;
-  RestStatistics rest_;
+  BasicRestStatistics<Scalar> rest_;
   Block held_, newest_;
-  Eigen::Matrix3d R_lb_{Eigen::Matrix3d::Identity()}, rest_R_lb_{Eigen::Matrix3d::Identity()};
-  Eigen::Matrix3d attitude_accel_bias_l_{Eigen::Matrix3d::Zero()};  ///< cov(d, b_a) of the rest with its attitude rows turned into l (or w)
-  Eigen::Vector3d gyro_bias_{Eigen::Vector3d::Zero()};
-  Eigen::Matrix3d gyro_bias_covariance_{Eigen::Matrix3d::Identity()};
+  Matrix3 R_lb_{Matrix3::Identity()}, rest_R_lb_{Matrix3::Identity()};
+  Matrix3 attitude_accel_bias_l_{Matrix3::Zero()};  ///< cov(d, b_a) of the rest with its attitude rows turned into l (or w)
+  Vector3 gyro_bias_{Vector3::Zero()};
+  Matrix3 gyro_bias_covariance_{Matrix3::Identity()};
   double tilt_variance_{0}, heading_variance_{0};
   GpsTime level_time_{};
   double since_rest_s_{0};
-  Eigen::Vector3d velocity_l_{Eigen::Vector3d::Zero()};
+  Vector3 velocity_l_{Vector3::Zero()};
   double interval_s_{0};
-  Eigen::Vector3d interval_force_b_{Eigen::Vector3d::Zero()};
+  Vector3 interval_force_b_{Vector3::Zero()};
 };
+using Initializer = BasicInitializer<double>;
 
 }  // namespace searvins::imu

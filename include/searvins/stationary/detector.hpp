@@ -43,13 +43,16 @@ struct DetectorSettings {
 };
 
 /// See the file comment.
-class Detector {
+template <class Scalar>
+class BasicDetector {
  public:
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+
   static constexpr int kBlocks = 10;
   static constexpr std::int64_t kBlockNs = 100'000'000;
 
-  Detector() : Detector(imu::ImuNoise{}) {}
-  explicit Detector(const imu::ImuNoise& noise, const DetectorSettings& settings = {}) : settings_(settings) {
+  BasicDetector() : BasicDetector(imu::ImuNoise{}) {}
+  explicit BasicDetector(const imu::ImuNoise& noise, const DetectorSettings& settings = {}) : settings_(settings) {
     const double per_density = settings.noise_factor * std::sqrt(3.0 / (static_cast<double>(kBlockNs) * 1e-9));
     noise_accel_ = per_density * noise.accel_noise_mps2_sqrt_hz;
     noise_gyro_ = per_density * noise.gyro_noise_radps_sqrt_hz;
@@ -80,15 +83,15 @@ class Detector {
   }
 
   /// Bias of the gyroscope, once it is known.
-  void set_gyro_bias(const Eigen::Vector3d& bias_b_radps) { gyro_bias_ = bias_b_radps; }
+  void set_gyro_bias(const Vector3& bias_b_radps) { gyro_bias_ = bias_b_radps; }
 
   [[nodiscard]] bool stationary() const { return stationary_; }
   /// Begin of the present rest (its first window); only while stationary().
   [[nodiscard]] GpsTime since() const { return since_; }
   [[nodiscard]] double rest_s() const { return stationary_ && last_ ? seconds_between(since_, *last_) : 0.0; }
   /// Means of the window: what a zero-angular-rate factor wants. Only when window_full().
-  [[nodiscard]] const Eigen::Vector3d& mean_gyro_b_radps() const { return mean_gyro_; }
-  [[nodiscard]] const Eigen::Vector3d& mean_accel_b_mps2() const { return mean_accel_; }
+  [[nodiscard]] const Vector3& mean_gyro_b_radps() const { return mean_gyro_; }
+  [[nodiscard]] const Vector3& mean_accel_b_mps2() const { return mean_accel_; }
   [[nodiscard]] bool window_full() const { return filled_ == kBlocks; }
   /// The statistic and what it is compared with.
   [[nodiscard]] double accel_spread_mps2() const { return spread_accel_; }
@@ -100,7 +103,7 @@ class Detector {
   struct Block {
     GpsTime begin{};
     int count{0};
-    Eigen::Vector3d accel{Eigen::Vector3d::Zero()}, gyro{Eigen::Vector3d::Zero()};  ///< sums while open, means in the ring
+    Vector3 accel{Vector3::Zero()}, gyro{Vector3::Zero()};  ///< sums while open, means in the ring
   };
 
   void restart() {
@@ -173,14 +176,15 @@ class Detector {
   std::array<Block, kBlocks> ring_{};
   Block open_{};
   int filled_{0}, next_{0};
-  Eigen::Vector3d mean_accel_{Eigen::Vector3d::Zero()}, mean_gyro_{Eigen::Vector3d::Zero()};
+  Vector3 mean_accel_{Vector3::Zero()}, mean_gyro_{Vector3::Zero()};
   double spread_accel_{0}, spread_gyro_{0};
   std::optional<double> learned_accel_, learned_gyro_;
-  std::optional<Eigen::Vector3d> gyro_bias_;
+  std::optional<Vector3> gyro_bias_;
   std::optional<GpsTime> last_, hint_time_;
   double hint_speed_{0}, hint_sigma_{0};
   bool stationary_{false};
   GpsTime since_{};
 };
+using Detector = BasicDetector<double>;
 
 }  // namespace searvins::stationary
