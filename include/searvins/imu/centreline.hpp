@@ -30,6 +30,7 @@
 #include <span>
 
 #include <searvins/geodesy/wgs84.hpp>
+#include <searvins/math/deferred.hpp>
 
 namespace searvins::imu {
 
@@ -66,13 +67,15 @@ struct CentrelineMatch {
 namespace detail {
 
 /// The segment from a to b beside p, or verdict none_near.
-[[nodiscard]] inline CentrelineMatch beside(const Eigen::Vector3d& a_e_m, const Eigen::Vector3d& b_e_m, const Eigen::Vector3d& p_e_m, const Eigen::Vector3d& up_e,
-                                            const Eigen::Vector3d& direction_e, const CentrelineOptions& options) {
+template <class Scalar>
+[[nodiscard]] CentrelineMatch beside(const math::Vector3<Scalar>& a_e_m, const math::Vector3<Scalar>& b_e_m, const math::Vector3<Scalar>& p_e_m,
+                                     const math::Vector3<Scalar>& up_e, const math::Vector3<Scalar>& direction_e, const CentrelineOptions& options) {
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
   CentrelineMatch m;
-  const Eigen::Vector3d ab_m = b_e_m - a_e_m, along_m = ab_m - up_e.dot(ab_m) * up_e;
+  const Vector3 ab_m = b_e_m - a_e_m, along_m = ab_m - up_e.dot(ab_m) * up_e;
   const double length_m = along_m.norm();
   if (!(length_m > 1e-3)) return m;
-  const Eigen::Vector3d t = along_m / length_m;
+  const Vector3 t = along_m / length_m;
   const double s_m = t.dot(p_e_m - a_e_m);
   const double cosine = options.both_ways ? std::abs(t.dot(direction_e)) : t.dot(direction_e);
   if (s_m < 0 || s_m > length_m || cosine < std::cos(options.max_direction_rad)) return m;
@@ -84,11 +87,12 @@ namespace detail {
 }
 
 /// Whether the line of the segment that ends at point `end` stays within max_bend_m of its straight for reach_m on either side of the match.
-[[nodiscard]] inline bool is_straight(Centrelines lines, std::size_t end, const CentrelineMatch& m, double reach_m, double max_bend_m) {
+template <class Scalar>
+[[nodiscard]] bool is_straight(Centrelines lines, std::size_t end, const CentrelineMatch& m, double reach_m, double max_bend_m) {
   const std::uint32_t line = lines[end].line;
   const auto stays = [&](std::size_t from, int step) {
     double way_m = 0;
-    Eigen::Vector3d last_e_m = m.point_e_m;
+    Eigen::Matrix<Scalar, 3, 1> last_e_m = m.point_e_m;
     for (std::size_t i = from; i < lines.size() && lines[i].line == line; i += static_cast<std::size_t>(step)) {  // below zero it wraps to beyond the end
       const double part_m = (lines[i].position_e_m - last_e_m).norm(), taken = way_m + part_m > reach_m ? (reach_m - way_m) / part_m : 1.0;
       if (std::abs(m.right_e.dot(last_e_m + taken * (lines[i].position_e_m - last_e_m) - m.point_e_m)) > max_bend_m) return false;
@@ -103,15 +107,17 @@ namespace detail {
 }  // namespace detail
 
 /// The line that a vehicle at p_e_m with velocity v_e_mps is on. `covariance_e_m2`: of p_e_m. One pass over the map.
-[[nodiscard]] inline CentrelineMatch match_centreline(Centrelines lines, const Eigen::Vector3d& p_e_m, const Eigen::Vector3d& v_e_mps,
-                                                      const Eigen::Matrix3d& covariance_e_m2, const CentrelineOptions& options = {}) {
+template <class Scalar = double>
+[[nodiscard]] CentrelineMatch match_centreline(Centrelines lines, const math::Vector3<Scalar>& p_e_m, const math::Vector3<Scalar>& v_e_mps,
+                                               const math::Matrix3<Scalar>& covariance_e_m2, const CentrelineOptions& options = {}) {
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
   CentrelineMatch best;
-  const Eigen::Vector3d up_e = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(p_e_m)).col(2);
-  const Eigen::Vector3d level_mps = v_e_mps - up_e.dot(v_e_mps) * up_e;
+  const Vector3 up_e = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(p_e_m)).col(2);
+  const Vector3 level_mps = v_e_mps - up_e.dot(v_e_mps) * up_e;
   best.verdict = CentrelineVerdict::slow;
   if (!(level_mps.norm() >= options.min_speed_mps)) return best;
   best.verdict = CentrelineVerdict::none_near;
-  const Eigen::Vector3d direction_e = level_mps.normalized();
+  const Vector3 direction_e = level_mps.normalized();
   const auto gate_m = [&](const CentrelineMatch& m) {
     const double variance_m2 = m.right_e.dot(covariance_e_m2 * m.right_e) + options.sigma_m * options.sigma_m;
     return options.gate_sigmas * std::sqrt(variance_m2);
@@ -121,7 +127,7 @@ namespace detail {
   double second_m = std::numeric_limits<double>::infinity();  // beyond its gate: how near the nearest segment of another line is
   for (std::size_t i = 1; i < lines.size(); ++i) {
     if (lines[i].line != lines[i - 1].line) continue;
-    const CentrelineMatch m = detail::beside(lines[i - 1].position_e_m, lines[i].position_e_m, p_e_m, up_e, direction_e, options);
+    const CentrelineMatch m = detail::beside<Scalar>(lines[i - 1].position_e_m, lines[i].position_e_m, p_e_m, up_e, direction_e, options);
     if (m.verdict != CentrelineVerdict::matched) continue;
     const bool is_nearer = best.verdict != CentrelineVerdict::matched || std::abs(m.offset_m) < std::abs(best.offset_m);
     const CentrelineMatch& other = is_nearer ? best : m;
@@ -134,9 +140,9 @@ namespace detail {
     best.verdict = CentrelineVerdict::gated;
   else if (second_m <= 0)
     best.verdict = CentrelineVerdict::ambiguous;
-  const Eigen::Vector3d along_e = up_e.cross(best.right_e);
+  const Vector3 along_e = up_e.cross(best.right_e);
   const double reach_m = options.gate_sigmas * std::sqrt(along_e.dot(covariance_e_m2 * along_e));
-  if (best.verdict == CentrelineVerdict::matched && !detail::is_straight(lines, end, best, reach_m, options.max_bend_m)) best.verdict = CentrelineVerdict::bent;
+  if (best.verdict == CentrelineVerdict::matched && !detail::is_straight<Scalar>(lines, end, best, reach_m, options.max_bend_m)) best.verdict = CentrelineVerdict::bent;
   return best;
 }
 

@@ -12,6 +12,7 @@
 
 #include <searvins/imu/lever_arm.hpp>
 #include <searvins/imu/navigation_state.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/robust/loss.hpp>
 #include <searvins/smoother/factor.hpp>
 
@@ -41,7 +42,7 @@ struct CentrelineFactor {
   }
   template <class Values>
   void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
-    LeverArm::Jacobian d_antenna;
+    math::Deferred<LeverArm::Jacobian, Values> d_antenna;
     e[0] = right_w.dot(antenna.position_w_m(values(state), &d_antenna) - point_w_m) / sigma_m;
     for (int c = 0; c < NavigationState::dof; ++c) J(0, c) = right_w.dot(d_antenna.col(c)) / sigma_m;
   }

@@ -16,15 +16,17 @@
 
 #include <searvins/core/status.hpp>
 #include <searvins/imu/navigation_state.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/smoother/factor.hpp>
 #include <searvins/smoother/variable.hpp>
 
 namespace searvins::stationary {
 
 /// A place in w, metres.
-struct PositionAnchor {
-  using Scalar = double;
-  using Step = Eigen::Vector3d;
+template <class S>
+struct BasicPositionAnchor {
+  using Scalar = S;
+  using Step = Eigen::Matrix<S, 3, 1>;
   static constexpr int dof = 3;
   static constexpr smoother::Role role = smoother::Role::chain;
   static constexpr const char* name = "position anchor";
@@ -32,21 +34,24 @@ struct PositionAnchor {
     constexpr const char* names[] = {"east", "north", "up"};
     return i >= 0 && i < 3 ? names[i] : "?";
   }
-  Eigen::Vector3d p_w_m{Eigen::Vector3d::Zero()};
-  [[nodiscard]] PositionAnchor retract(const Step& d) const { return {p_w_m + d}; }
-  [[nodiscard]] Step local(const PositionAnchor& y) const { return y.p_w_m - p_w_m; }
+  Step p_w_m{Step::Zero()};
+  [[nodiscard]] BasicPositionAnchor retract(const Step& d) const { return {p_w_m + d}; }
+  [[nodiscard]] Step local(const BasicPositionAnchor& y) const { return y.p_w_m - p_w_m; }
   /// Linear in every factor; a metre gives the convergence test its millimetre.
   [[nodiscard]] static Step linearisation_scale() { return Step::Ones(); }
 };
+using PositionAnchor = BasicPositionAnchor<double>;
 
 /// r = p_wb - s.
-struct PositionAnchorFactor {
-  using Scalar = double;
+template <class S>
+struct BasicPositionAnchorFactor {
+  using Scalar = S;
+  using Vector3 = Eigen::Matrix<S, 3, 1>;
   static constexpr int max_rows = 3, max_keys = 2, max_columns = 18;
   static constexpr const char* name = "position anchor";
   smoother::Key<imu::NavigationState> state{};
-  smoother::Key<PositionAnchor> anchor{};
-  double sigma_m{0.02};
+  smoother::Key<BasicPositionAnchor<S>> anchor{};
+  Scalar sigma_m{0.02};
 
   [[nodiscard]] int rows() const { return 3; }
   template <class Visit>
@@ -54,28 +59,32 @@ struct PositionAnchorFactor {
     visit(state), visit(anchor);
   }
   template <class Values>
-  void evaluate(const Values& values, double* e) const {
-    Eigen::Map<Eigen::Vector3d>{e} = (values(state).p_wb_m - values(anchor).p_w_m) / sigma_m;
+  void evaluate(const Values& values, Scalar* e) const {
+    Eigen::Map<Vector3>{e} = (values(state).p_wb_m - values(anchor).p_w_m) / sigma_m;
   }
   template <class Values>
-  void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
+  void linearise(const Values& values, Scalar* e, smoother::JacobianRef<Scalar> J) const {
     evaluate(values, e);
     for (int i = 0; i < 3; ++i) {
       J(i, imu::NavigationState::position + i) = 1.0 / sigma_m;
       J(i, imu::NavigationState::dof + i) = -1.0 / sigma_m;
     }
   }
-  double weigh(const double* e, double* w) const { return smoother::weigh_gaussian(e, 3, w); }
+  Scalar weigh(const Scalar* e, Scalar* w) const { return smoother::weigh_gaussian(e, 3, w); }
 };
+using PositionAnchorFactor = BasicPositionAnchorFactor<double>;
 
 /// The latched prior of an anchor.
-struct PositionAnchorPriorFactor {
-  using Scalar = double;
+template <class S>
+struct BasicPositionAnchorPriorFactor {
+  using Scalar = S;
+  using Vector3 = Eigen::Matrix<S, 3, 1>;
+  using Matrix3 = Eigen::Matrix<S, 3, 3>;
   static constexpr int max_rows = 3, max_keys = 1, max_columns = 3;
   static constexpr const char* name = "position anchor prior";
-  smoother::Key<PositionAnchor> anchor{};
-  Eigen::Vector3d mean_w_m{Eigen::Vector3d::Zero()};
-  Eigen::Matrix3d whitening{Eigen::Matrix3d::Identity()};  ///< L^-1, lower triangular
+  smoother::Key<BasicPositionAnchor<S>> anchor{};
+  Vector3 mean_w_m{Vector3::Zero()};
+  Matrix3 whitening{Matrix3::Identity()};  ///< L^-1, lower triangular
 
   [[nodiscard]] int rows() const { return 3; }
   template <class Visit>
@@ -83,24 +92,28 @@ struct PositionAnchorPriorFactor {
     visit(anchor);
   }
   template <class Values>
-  void evaluate(const Values& values, double* e) const {
-    Eigen::Map<Eigen::Vector3d>{e} = whitening * (values(anchor).p_w_m - mean_w_m);
+  void evaluate(const Values& values, Scalar* e) const {
+    Eigen::Map<Vector3>{e} = whitening * (values(anchor).p_w_m - mean_w_m);
   }
   template <class Values>
-  void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
+  void linearise(const Values& values, Scalar* e, smoother::JacobianRef<Scalar> J) const {
     evaluate(values, e);
-    J.block<3, 3>(0, 0) = whitening;
+    J.template block<3, 3>(0, 0) = whitening;
   }
-  double weigh(const double* e, double* w) const { return smoother::weigh_gaussian(e, 3, w); }
+  Scalar weigh(const Scalar* e, Scalar* w) const { return smoother::weigh_gaussian(e, 3, w); }
 };
+using PositionAnchorPriorFactor = BasicPositionAnchorPriorFactor<double>;
 
 /// The prior of an anchor that is latched at a position with this covariance (w, m^2). The floor, 5 cm by default, adds to every axis.
 /// Errors: non_finite, not_positive_definite (index: the pivot).
-[[nodiscard]] inline Result<PositionAnchorPriorFactor> latch(smoother::Key<PositionAnchor> anchor, const Eigen::Vector3d& position_w_m,
-                                                             const Eigen::Matrix3d& covariance_w_m2, double floor_m = 0.05) {
+template <class Scalar = double>
+[[nodiscard]] Result<BasicPositionAnchorPriorFactor<Scalar>> latch(smoother::Key<BasicPositionAnchor<Scalar>> anchor,
+                                                                   const math::Vector3<Scalar>& position_w_m,
+                                                                   const math::Matrix3<Scalar>& covariance_w_m2, double floor_m = 0.05) {
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
   if (!position_w_m.allFinite() || !covariance_w_m2.allFinite()) return failure(StatusCode::non_finite, "anchor position or covariance is not finite");
-  const Eigen::Matrix3d C = covariance_w_m2 + floor_m * floor_m * Eigen::Matrix3d::Identity();
-  Eigen::Matrix3d L = Eigen::Matrix3d::Zero();  // Cholesky by hand: three pivots
+  const Matrix3 C = covariance_w_m2 + floor_m * floor_m * Matrix3::Identity();
+  Matrix3 L = Matrix3::Zero();  // Cholesky by hand: three pivots
   for (int j = 0; j < 3; ++j)
     for (int i = j; i < 3; ++i) {
       double sum = C(i, j);
@@ -108,10 +121,10 @@ struct PositionAnchorPriorFactor {
       if (i == j && !(sum > 1e-12 * C(j, j))) return failure(StatusCode::not_positive_definite, "covariance of the anchor's position", j, -1, sum);
       L(i, j) = i == j ? std::sqrt(sum) : sum / L(j, j);
     }
-  PositionAnchorPriorFactor prior;
+  BasicPositionAnchorPriorFactor<Scalar> prior;
   prior.anchor = anchor;
   prior.mean_w_m = position_w_m;
-  Eigen::Matrix3d& W = prior.whitening;
+  Matrix3& W = prior.whitening;
   W.setZero();
   for (int j = 0; j < 3; ++j) {
     W(j, j) = 1 / L(j, j);
