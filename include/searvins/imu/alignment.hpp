@@ -168,8 +168,9 @@ struct RestAlignment {
 /// Errors: too_few (under 10 samples); those of attitude_from_force; rejected: the mean is not gravity's size to within 10 %: value = |mean|.
 template <class Scalar>
 [[nodiscard]] Result<RestAlignment> align_at_rest(const BasicRestStatistics<Scalar>& rest, const ImuNoise& noise,
-                                                  const math::Vector3<Scalar>& gravity_w_mps2, const math::Vector3<Scalar>& earth_rate_w_radps,
-                                                  double heading_rad, double sigma_heading_rad) {
+                                                  const math::Vector3<Scalar>& gravity_w_mps2,
+                                                  const math::Vector3<Scalar>& earth_rate_w_radps, double heading_rad,
+                                                  double sigma_heading_rad) {
   using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
   using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
   if (rest.count() < 10) return failure(StatusCode::too_few, "fewer than 10 samples at rest", static_cast<std::int32_t>(rest.count()), 10);

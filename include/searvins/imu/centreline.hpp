@@ -60,7 +60,7 @@ enum class CentrelineVerdict : std::uint8_t { matched, slow, none_near, gated, a
 struct CentrelineMatch {
   CentrelineVerdict verdict{CentrelineVerdict::none_near};
   Eigen::Vector3d point_e_m{Eigen::Vector3d::Zero()};   ///< on the line
-  Eigen::Vector3d right_e{Eigen::Vector3d::UnitX()};    ///< n: horizontal, to the right of the line's own direction
+  Eigen::Vector3d right_e{1, 0, 0};                     ///< n: horizontal, to the right of the line's own direction
   double offset_m{0};                                   ///< d: the vehicle is so far to the right of the line
 };
 
@@ -68,8 +68,9 @@ namespace detail {
 
 /// The segment from a to b beside p, or verdict none_near.
 template <class Scalar>
-[[nodiscard]] CentrelineMatch beside(const math::Vector3<Scalar>& a_e_m, const math::Vector3<Scalar>& b_e_m, const math::Vector3<Scalar>& p_e_m,
-                                     const math::Vector3<Scalar>& up_e, const math::Vector3<Scalar>& direction_e, const CentrelineOptions& options) {
+[[nodiscard]] CentrelineMatch beside(const math::Vector3<Scalar>& a_e_m, const math::Vector3<Scalar>& b_e_m,
+                                     const math::Vector3<Scalar>& p_e_m, const math::Vector3<Scalar>& up_e,
+                                     const math::Vector3<Scalar>& direction_e, const CentrelineOptions& options) {
   using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
   CentrelineMatch m;
   const Vector3 ab_m = b_e_m - a_e_m, along_m = ab_m - up_e.dot(ab_m) * up_e;
@@ -142,7 +143,8 @@ template <class Scalar = double>
     best.verdict = CentrelineVerdict::ambiguous;
   const Vector3 along_e = up_e.cross(best.right_e);
   const double reach_m = options.gate_sigmas * std::sqrt(along_e.dot(covariance_e_m2 * along_e));
-  if (best.verdict == CentrelineVerdict::matched && !detail::is_straight<Scalar>(lines, end, best, reach_m, options.max_bend_m)) best.verdict = CentrelineVerdict::bent;
+  if (best.verdict == CentrelineVerdict::matched && !detail::is_straight<Scalar>(lines, end, best, reach_m, options.max_bend_m))
+    best.verdict = CentrelineVerdict::bent;
   return best;
 }
 

@@ -27,7 +27,7 @@ struct CentrelineFactor {
   smoother::Key<NavigationState> state{};
   LeverArm antenna{};
   Eigen::Vector3d point_w_m{Eigen::Vector3d::Zero()};
-  Eigen::Vector3d right_w{Eigen::Vector3d::UnitX()};
+  Eigen::Vector3d right_w{1, 0, 0};
   double sigma_m{0.5};
   robust::Dcs<double> loss{};
 
