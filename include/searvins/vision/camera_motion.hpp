@@ -17,34 +17,39 @@
 namespace searvins::vision {
 
 /// See the file comment.
-struct CameraMotion {
-  Eigen::Matrix3d R_prev_cur{Eigen::Matrix3d::Identity()};
-  Eigen::Vector3d t_prev_cur_m{Eigen::Vector3d::Zero()};
+template <class Scalar>
+struct BasicCameraMotion {
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+  using Tangent = Eigen::Matrix<Scalar, 6, 1>;
+
+  Matrix3 R_prev_cur{Matrix3::Identity()};
+  Vector3 t_prev_cur_m{Vector3::Zero()};
 
   /// A point of the previous frame in coordinates of the current one.
-  [[nodiscard]] Eigen::Vector3d to_current(const Eigen::Vector3d& p_prev_m) const {
-    return R_prev_cur.transpose() * (p_prev_m - t_prev_cur_m);
-  }
+  [[nodiscard]] Vector3 to_current(const Vector3& p_prev_m) const { return R_prev_cur.transpose() * (p_prev_m - t_prev_cur_m); }
   /// A point of the current frame in coordinates of the previous one.
-  [[nodiscard]] Eigen::Vector3d to_previous(const Eigen::Vector3d& p_cur_m) const { return R_prev_cur * p_cur_m + t_prev_cur_m; }
+  [[nodiscard]] Vector3 to_previous(const Vector3& p_cur_m) const { return R_prev_cur * p_cur_m + t_prev_cur_m; }
 
   /// This motion followed by `next`, the one from its current frame on.
-  [[nodiscard]] CameraMotion then(const CameraMotion& next) const {
+  [[nodiscard]] BasicCameraMotion then(const BasicCameraMotion& next) const {
     return {R_prev_cur * next.R_prev_cur, R_prev_cur * next.t_prev_cur_m + t_prev_cur_m};
   }
   /// The motion moved by a tangent vector [dtheta, dt].
-  [[nodiscard]] CameraMotion plus(const Eigen::Matrix<double, 6, 1>& delta) const {
-    return {R_prev_cur * so3::exp(delta.head<3>()), t_prev_cur_m + delta.tail<3>()};
+  [[nodiscard]] BasicCameraMotion plus(const Tangent& delta) const {
+    return {R_prev_cur * so3::exp(delta.template head<3>()), t_prev_cur_m + delta.template tail<3>()};
   }
   /// Tangent vector that leads from `other` to this one: other.plus(minus(other)) is this motion.
-  [[nodiscard]] Eigen::Matrix<double, 6, 1> minus(const CameraMotion& other) const {
-    Eigen::Matrix<double, 6, 1> delta;
+  [[nodiscard]] Tangent minus(const BasicCameraMotion& other) const {
+    Tangent delta;
     delta << so3::log(other.R_prev_cur.transpose() * R_prev_cur), t_prev_cur_m - other.t_prev_cur_m;
     return delta;
   }
   /// Angle of the rotation, rad in [0, pi].
-  [[nodiscard]] double angle_rad() const { return so3::log(R_prev_cur).norm(); }
+  [[nodiscard]] Scalar angle_rad() const { return so3::log(R_prev_cur).norm(); }
   [[nodiscard]] bool finite() const { return R_prev_cur.allFinite() && t_prev_cur_m.allFinite(); }
 };
+
+using CameraMotion = BasicCameraMotion<double>;
 
 }  // namespace searvins::vision

@@ -23,6 +23,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <searvins/math/deferred.hpp>
 #include <searvins/vision/camera_motion.hpp>
 #include <searvins/vision/pnp.hpp>
 
@@ -67,15 +68,17 @@ struct MotionDifference {
 };
 
 /// `covariance`: of the seen motion. A prediction that is not finite is infinitely far away.
-[[nodiscard]] inline MotionDifference difference(const CameraMotion& seen, const Eigen::Matrix<double, 6, 6>& covariance,
-                                                 const PredictedMotion& predicted, const ConsistencyOptions& options = {}) {
-  const Eigen::Matrix<double, 6, 1> delta = seen.minus(predicted.motion);
-  const Eigen::Matrix<double, 6, 6> both = covariance + predicted.covariance;
+template <class Scalar = double>
+[[nodiscard]] MotionDifference difference(const BasicCameraMotion<Scalar>& seen, const math::Matrix<Scalar, 6, 6>& covariance,
+                                          const PredictedMotion& predicted, const ConsistencyOptions& options = {}) {
+  const BasicCameraMotion<Scalar>& expected = predicted.motion;
+  const Eigen::Matrix<Scalar, 6, 1> delta = seen.minus(expected);
+  const Eigen::Matrix<Scalar, 6, 6> both = covariance + predicted.covariance;
   MotionDifference d;
-  d.turn_rad = delta.head<3>().norm(), d.way_m = delta.tail<3>().norm();
-  d.turn_bound_rad = options.max_turn_rad + options.noise_sigmas * std::sqrt(both.topLeftCorner<3, 3>().trace());
-  d.way_bound_m = std::max(options.max_way_m, options.max_way_share * predicted.motion.t_prev_cur_m.norm()) +
-                  options.noise_sigmas * std::sqrt(both.bottomRightCorner<3, 3>().trace());
+  d.turn_rad = delta.template head<3>().norm(), d.way_m = delta.template tail<3>().norm();
+  d.turn_bound_rad = options.max_turn_rad + options.noise_sigmas * std::sqrt(both.template topLeftCorner<3, 3>().trace());
+  d.way_bound_m = std::max(options.max_way_m, options.max_way_share * expected.t_prev_cur_m.norm()) +
+                  options.noise_sigmas * std::sqrt(both.template bottomRightCorner<3, 3>().trace());
   return d;
 }
 

@@ -36,6 +36,7 @@
 
 #include <searvins/core/static_vector.hpp>
 #include <searvins/core/status.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/math/small_cholesky.hpp>
 #include <searvins/math/so3.hpp>
 #include <searvins/robust/loss.hpp>
@@ -94,10 +95,12 @@ class SplitMix {
 };
 
 /// Lower Cholesky factor of I + T T', which is never singular.
-[[nodiscard]] inline Eigen::Matrix3d residual_factor(const Eigen::Matrix3d& T) {
-  Eigen::Matrix3d S = Eigen::Matrix3d::Identity();
+template <class Scalar = double>
+[[nodiscard]] Eigen::Matrix<Scalar, 3, 3> residual_factor(const math::Matrix3<Scalar>& T) {
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+  Matrix3 S = Matrix3::Identity();
   S.noalias() += T * T.transpose();
-  Eigen::Matrix3d L = Eigen::Matrix3d::Zero();
+  Matrix3 L = Matrix3::Zero();
   L(0, 0) = std::sqrt(S(0, 0));
   L(1, 0) = S(1, 0) / L(0, 0), L(2, 0) = S(2, 0) / L(0, 0);
   L(1, 1) = std::sqrt(S(1, 1) - L(1, 0) * L(1, 0));
@@ -107,8 +110,8 @@ class SplitMix {
 }
 
 /// X <- L^-1 X.
-template <int K>
-void whiten(const Eigen::Matrix3d& L, Eigen::Matrix<double, 3, K>& X) {
+template <int K, class Scalar>
+void whiten(const Eigen::Matrix<Scalar, 3, 3>& L, Eigen::Matrix<Scalar, 3, K>& X) {
   X.row(0) /= L(0, 0);
   X.row(1) = (X.row(1) - L(1, 0) * X.row(0)) / L(1, 1);
   X.row(2) = (X.row(2) - L(2, 0) * X.row(0) - L(2, 1) * X.row(1)) / L(2, 2);
@@ -120,10 +123,12 @@ void whiten(const Eigen::Matrix3d& L, Eigen::Matrix<double, 3, K>& X) {
 template <std::size_t N>
 class StereoPnp {
  public:
-  using Camera = StereoCamera<double>;
+  using Scalar = math::DeferredFor<double, N>;
+  using Camera = StereoCamera<Scalar>;
+  using Motion = BasicCameraMotion<Scalar>;
   using Pairs = StaticVector<PixelPair, N>;
-  using Matrix6 = Eigen::Matrix<double, 6, 6>;
-  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  using Matrix6 = Eigen::Matrix<Scalar, 6, 6>;
+  using Vector6 = Eigen::Matrix<Scalar, 6, 1>;
 
   explicit StereoPnp(const Camera& camera, const PnpOptions& options = {}) : camera_(camera), options_(options) {}
 
@@ -144,23 +149,27 @@ class StereoPnp {
   }
 
   /// The motion of the last successful solve, and its covariance in the tangent order of CameraMotion.
-  [[nodiscard]] const CameraMotion& motion() const { return motion_; }
+  [[nodiscard]] const Motion& motion() const { return motion_; }
   [[nodiscard]] const Matrix6& covariance() const { return covariance_; }
   [[nodiscard]] const PnpStatistics& statistics() const { return statistics_; }
   /// Whether pair i of the last call agrees with the motion.
   [[nodiscard]] bool is_inlier(std::size_t i) const { return i < is_inlier_.size() && is_inlier_[i]; }
 
   /// d of a pair under a motion, px; infinite where a motion puts the point behind the camera, and for pairs without disparity.
-  [[nodiscard]] double distance_px(const PixelPair& pair, const CameraMotion& motion) const {
+  [[nodiscard]] double distance_px(const PixelPair& pair, const Motion& motion) const {
     if (!usable(pair)) return std::numeric_limits<double>::infinity();
     return std::sqrt(distance2(point_of(pair, 0), motion));
   }
 
  private:
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+  using Cholesky = math::DeferredFor<math::SmallCholesky<6>, N>;
+
   /// A usable pair and what of it does not depend on the motion.
   struct Point {
-    Eigen::Vector3d p_prev_m{Eigen::Vector3d::Zero()}, current_px{Eigen::Vector3d::Zero()};
-    Eigen::Matrix3d d_p_d_px{Eigen::Matrix3d::Zero()};  ///< P
+    Vector3 p_prev_m{Vector3::Zero()}, current_px{Vector3::Zero()};
+    Matrix3 d_p_d_px{Matrix3::Zero()};  ///< P
     std::size_t pair{0};
   };
 
@@ -193,8 +202,9 @@ class StereoPnp {
   }
 
   [[nodiscard]] bool usable(const PixelPair& pair) const {
-    return range_fault(camera_, pair.previous_px, options_.range) == RangeFault::none && pair.current_px.allFinite() &&
-           pair.current_px[0] > pair.current_px[1];
+    const StereoPixel<Scalar>& current_px = pair.current_px;
+    return range_fault(camera_, pair.previous_px, options_.range) == RangeFault::none && current_px.allFinite() &&
+           current_px[0] > current_px[1];
   }
 
   [[nodiscard]] Point point_of(const PixelPair& pair, std::size_t index) const {
@@ -212,19 +222,19 @@ class StereoPnp {
   }
 
   /// d^2 of the file comment.
-  [[nodiscard]] double distance2(const Point& point, const CameraMotion& motion) const {
-    const Eigen::Vector3d q = motion.to_current(point.p_prev_m);
+  [[nodiscard]] double distance2(const Point& point, const Motion& motion) const {
+    const Vector3 q = motion.to_current(point.p_prev_m);
     if (!camera_.in_front(q)) return std::numeric_limits<double>::infinity();
-    Eigen::Matrix3d D;
-    Eigen::Vector3d e = point.current_px - camera_.continued(q, &D);
-    const Eigen::Matrix3d T = D * (motion.R_prev_cur.transpose() * point.d_p_d_px);
-    detail::whiten<1>(detail::residual_factor(T), e);
+    Matrix3 D;
+    Vector3 e = point.current_px - camera_.continued(q, &D);
+    const Matrix3 T = D * (motion.R_prev_cur.transpose() * point.d_p_d_px);
+    detail::whiten<1>(detail::residual_factor<Scalar>(T), e);
     const double d2 = e.squaredNorm();
     return d2 >= 0 ? d2 : std::numeric_limits<double>::infinity();  // a NaN agrees with nothing
   }
 
   /// Truncated cost of a motion, infinite as soon as it exceeds `bound`.
-  [[nodiscard]] double score(const CameraMotion& motion, double bound, std::size_t& inliers) const {
+  [[nodiscard]] double score(const Motion& motion, double bound, std::size_t& inliers) const {
     const double limit = options_.inlier_px * options_.inlier_px;
     double cost = 0;
     inliers = 0;
@@ -238,15 +248,15 @@ class StereoPnp {
   }
 
   /// Adds a pair's share of the normal equations at `motion`, with Huber's weight or (for the covariance) without; returns d^2.
-  double accumulate(const Point& point, const CameraMotion& motion, bool weighted, Matrix6& H, Vector6& g) const {
-    const Eigen::Vector3d q = motion.to_current(point.p_prev_m);
-    const Eigen::Matrix3d R_cur_prev = motion.R_prev_cur.transpose();
-    Eigen::Matrix3d D;
-    Eigen::Vector3d e = point.current_px - camera_.continued(q, &D);
-    Eigen::Matrix<double, 3, 6> A;
-    A.leftCols<3>() = D * so3::skew(q);
-    A.rightCols<3>() = -(D * R_cur_prev);
-    const Eigen::Matrix3d L = detail::residual_factor(D * (R_cur_prev * point.d_p_d_px));
+  double accumulate(const Point& point, const Motion& motion, bool weighted, Matrix6& H, Vector6& g) const {
+    const Vector3 q = motion.to_current(point.p_prev_m);
+    const Matrix3 R_cur_prev = motion.R_prev_cur.transpose();
+    Matrix3 D;
+    Vector3 e = point.current_px - camera_.continued(q, &D);
+    Eigen::Matrix<Scalar, 3, 6> A;
+    A.template leftCols<3>() = D * so3::skew(q);
+    A.template rightCols<3>() = -(D * R_cur_prev);
+    const Matrix3 L = detail::residual_factor<Scalar>(D * (R_cur_prev * point.d_p_d_px));
     detail::whiten<1>(L, e);
     detail::whiten<6>(L, A);
     const double d2 = e.squaredNorm();
@@ -258,17 +268,17 @@ class StereoPnp {
 
   /// Gauss-Newton, at most `steps` steps, over the points that `for_each(visit)` visits; false when they do not determine the motion.
   template <class ForEach>
-  [[nodiscard]] bool descend(CameraMotion& motion, int steps, bool weighted, ForEach for_each) const {
+  [[nodiscard]] bool descend(Motion& motion, int steps, bool weighted, ForEach for_each) const {
     constexpr double kTurnRad = 1e-10, kWayM = 1e-9;  // steps below are rounding
     for (int i = 0; i < steps; ++i) {
       Matrix6 H = Matrix6::Zero();
       Vector6 g = Vector6::Zero();
       for_each([&](const Point& point) { (void)accumulate(point, motion, weighted, H, g); });
-      const math::SmallCholesky<6> factor(H);
+      const Cholesky factor(H);
       if (!factor.ok()) return false;
       const Vector6 delta = factor.solve(g);
       motion = motion.plus(delta);
-      if (delta.head<3>().norm() < kTurnRad && delta.tail<3>().norm() < kWayM) break;
+      if (delta.template head<3>().norm() < kTurnRad && delta.template tail<3>().norm() < kWayM) break;
     }
     return motion.finite();
   }
@@ -283,13 +293,13 @@ class StereoPnp {
     return {a, b, c};
   }
 
-  [[nodiscard]] bool hypothesis(const std::array<std::size_t, 3>& sample, CameraMotion& motion) const {
-    PointTriple previous, current;
+  [[nodiscard]] bool hypothesis(const std::array<std::size_t, 3>& sample, Motion& motion) const {
+    BasicPointTriple<Scalar> previous, current;
     for (std::size_t i = 0; i < 3; ++i) {
       previous[i] = points_[sample[i]].p_prev_m;
-      current[i] = point_at<double>(camera_, points_[sample[i]].current_px);
+      current[i] = point_at<Scalar>(camera_, points_[sample[i]].current_px);
     }
-    const Result<CameraMotion> aligned = align_three_points(previous, current, options_.min_shape);
+    const Result<Motion> aligned = align_three_points(previous, current, options_.min_shape);
     if (!aligned) return false;
     motion = *aligned;
     return descend(motion, 2, false, [&](auto visit) {
@@ -302,7 +312,7 @@ class StereoPnp {
     int needed = options_.max_iterations;
     for (int i = 0; i < needed; ++i) {
       ++statistics_.iterations;
-      CameraMotion candidate;
+      Motion candidate;
       if (!hypothesis(draw(random), candidate)) {
         ++statistics_.degenerate;
         continue;
@@ -321,7 +331,7 @@ class StereoPnp {
     return samples < options_.max_iterations ? std::max(1, static_cast<int>(std::ceil(samples))) : options_.max_iterations;
   }
 
-  bool take_if_better(const CameraMotion& candidate) {
+  bool take_if_better(const Motion& candidate) {
     std::size_t inliers = 0;
     const double cost = score(candidate, cost_, inliers);
     if (!(cost < cost_)) return false;
@@ -336,7 +346,7 @@ class StereoPnp {
     const double limit = options_.inlier_px * options_.inlier_px;
     for (int round = 0; round < kRounds; ++round) {
       mark_inliers(limit);
-      CameraMotion refined = motion_;
+      Motion refined = motion_;
       const auto inliers = [&](auto visit) {
         for (const Point& point : points_)
           if (is_inlier_[point.pair]) visit(point);
@@ -368,7 +378,7 @@ class StereoPnp {
     double sum = 0;
     for (const Point& point : points_)
       if (is_inlier_[point.pair]) sum += accumulate(point, motion_, false, H, g);
-    const math::SmallCholesky<6> factor(H);
+    const Cholesky factor(H);
     if (!factor.ok()) return failure(StatusCode::under_determined, "PnP: the points that agree do not determine a motion");
     statistics_.rms_px = std::sqrt(sum / static_cast<double>(3 * statistics_.inliers - 6));
     const double sigma_px = std::max(options_.sigma_px, statistics_.rms_px);
@@ -380,7 +390,7 @@ class StereoPnp {
   PnpOptions options_;
   StaticVector<Point, N> points_;
   StaticVector<bool, N> is_inlier_;
-  CameraMotion motion_;
+  Motion motion_;
   Matrix6 covariance_{Matrix6::Zero()};
   PnpStatistics statistics_;
   double cost_{std::numeric_limits<double>::infinity()};

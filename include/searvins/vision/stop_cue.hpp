@@ -22,6 +22,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <searvins/math/deferred.hpp>
 #include <searvins/vision/camera_motion.hpp>
 
 namespace searvins::vision {
@@ -44,9 +45,11 @@ class StopCue {
 
   /// Takes the motion of a frame, its covariance (tangent order of CameraMotion), the median displacement of its points in the left image
   /// and their noise; `step_s`: time since the frame before. Returns whether the cue is up.
-  bool add(const CameraMotion& motion, const Eigen::Matrix<double, 6, 6>& covariance, double median_px, double rms_px, double step_s) {
-    const double sigma_turn = std::sqrt(covariance.topLeftCorner<3, 3>().trace()),
-                 sigma_way = std::sqrt(covariance.bottomRightCorner<3, 3>().trace());
+  template <class Scalar = double>
+  bool add(const BasicCameraMotion<Scalar>& motion, const math::Matrix<Scalar, 6, 6>& covariance, double median_px, double rms_px,
+           double step_s) {
+    const Scalar sigma_turn = std::sqrt(covariance.template topLeftCorner<3, 3>().trace()),
+                 sigma_way = std::sqrt(covariance.template bottomRightCorner<3, 3>().trace());
     const bool known = sigma_turn < options_.useful_turn_rad && sigma_way < options_.useful_way_m;
     const double max_way_m = std::min(options_.max_way_m, options_.max_speed_mps * step_s);
     const bool still = known && motion.t_prev_cur_m.norm() < std::max(max_way_m, 2 * sigma_way) &&

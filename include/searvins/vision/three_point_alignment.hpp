@@ -31,20 +31,24 @@
 namespace searvins::vision {
 
 /// Three points in the axes of one camera, m.
-using PointTriple = std::array<Eigen::Vector3d, 3>;
+template <class Scalar>
+using BasicPointTriple = std::array<Eigen::Matrix<Scalar, 3, 1>, 3>;
+using PointTriple = BasicPointTriple<double>;
 
 /// Twice the area of a triangle over the square of its longest side: 0 for points on a line, sqrt(3)/2 at most. NaN for one point thrice.
-[[nodiscard]] inline double triangle_shape(const PointTriple& p) {
-  const Eigen::Vector3d u = p[1] - p[0], v = p[2] - p[0];
-  const double longest2 = std::max({u.squaredNorm(), v.squaredNorm(), (v - u).squaredNorm()});
+template <class Scalar = double>
+[[nodiscard]] Scalar triangle_shape(const BasicPointTriple<Scalar>& p) {
+  const Eigen::Matrix<Scalar, 3, 1> u = p[1] - p[0], v = p[2] - p[0];
+  const Scalar longest2 = std::max({u.squaredNorm(), v.squaredNorm(), (v - u).squaredNorm()});
   return u.cross(v).norm() / longest2;
 }
 
 namespace detail {
 
 /// Orthonormal axes of a triangle: its first side, the direction in its plane, its normal.
-[[nodiscard]] inline Eigen::Matrix3d triangle_axes(const PointTriple& p) {
-  Eigen::Matrix3d F;
+template <class Scalar>
+[[nodiscard]] Eigen::Matrix<Scalar, 3, 3> triangle_axes(const BasicPointTriple<Scalar>& p) {
+  Eigen::Matrix<Scalar, 3, 3> F;
   F.col(0) = (p[1] - p[0]).normalized();
   F.col(2) = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
   F.col(1) = F.col(2).cross(F.col(0));
@@ -55,25 +59,28 @@ namespace detail {
 
 /// The motion that aligns three points; p_prev_m[i] and p_cur_m[i] are the same point.
 /// Errors: under_determined (a triangle of triangle_shape below min_shape, or not finite; value: the shape).
-[[nodiscard]] inline Result<CameraMotion> align_three_points(const PointTriple& p_prev_m, const PointTriple& p_cur_m,
-                                                             double min_shape = 0.02) {
-  const double shape_prev = triangle_shape(p_prev_m), shape_cur = triangle_shape(p_cur_m);
+template <class Scalar = double>
+[[nodiscard]] Result<BasicCameraMotion<Scalar>> align_three_points(const BasicPointTriple<Scalar>& p_prev_m,
+                                                                   const BasicPointTriple<Scalar>& p_cur_m, double min_shape = 0.02) {
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+  const Scalar shape_prev = triangle_shape(p_prev_m), shape_cur = triangle_shape(p_cur_m);
   if (!(shape_prev >= min_shape && shape_cur >= min_shape))
     return failure(StatusCode::under_determined, "three points: nearly on a line", -1, -1, std::min(shape_prev, shape_cur));
-  const Eigen::Vector3d mean_prev = (p_prev_m[0] + p_prev_m[1] + p_prev_m[2]) / 3, mean_cur = (p_cur_m[0] + p_cur_m[1] + p_cur_m[2]) / 3;
-  const Eigen::Matrix3d F_prev = detail::triangle_axes(p_prev_m), F_cur = detail::triangle_axes(p_cur_m);
-  double along = 0, across = 0;
+  const Vector3 mean_prev = (p_prev_m[0] + p_prev_m[1] + p_prev_m[2]) / 3, mean_cur = (p_cur_m[0] + p_cur_m[1] + p_cur_m[2]) / 3;
+  const Matrix3 F_prev = detail::triangle_axes(p_prev_m), F_cur = detail::triangle_axes(p_cur_m);
+  Scalar along = 0, across = 0;
   for (std::size_t i = 0; i < 3; ++i) {
-    const Eigen::Vector3d a = F_prev.transpose() * (p_prev_m[i] - mean_prev), b = F_cur.transpose() * (p_cur_m[i] - mean_cur);
+    const Vector3 a = F_prev.transpose() * (p_prev_m[i] - mean_prev), b = F_cur.transpose() * (p_cur_m[i] - mean_cur);
     along += a.x() * b.x() + a.y() * b.y();
     across += a.y() * b.x() - a.x() * b.y();
   }
-  const double length = std::hypot(along, across);
+  const Scalar length = std::hypot(along, across);
   if (!(length > 0)) return failure(StatusCode::under_determined, "three points: the triangles have nothing in common");
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  Matrix3 turn = Matrix3::Identity();
   turn(0, 0) = turn(1, 1) = along / length;
   turn(1, 0) = across / length, turn(0, 1) = -across / length;
-  CameraMotion motion;
+  BasicCameraMotion<Scalar> motion;
   motion.R_prev_cur = F_prev * turn * F_cur.transpose();
   motion.t_prev_cur_m = mean_prev - motion.R_prev_cur * mean_cur;
   return motion;
