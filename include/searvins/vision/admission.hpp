@@ -73,14 +73,16 @@ struct AdmittedObservation {
 /// What a frame gives.
 template <std::size_t N>
 struct AdmittedFrame {
+  using Scalar = typename StereoPnp<N>::Scalar;
+
   GpsTime time{};
   FrameFate fate{FrameFate::empty};
   FrameDecision decision{FrameDecision::reject};
   StaticVector<AdmittedObservation, N> observations{};  ///< none when rejected
   StaticVector<ObservationFate, N> fates{};             ///< of the observations offered, in their order
   bool has_motion{false};                               ///< PnP found a motion since the previous frame
-  CameraMotion motion{};
-  Eigen::Matrix<double, 6, 6, Eigen::DontAlign> covariance{Eigen::Matrix<double, 6, 6>::Zero()};  ///< in the tangent order of CameraMotion
+  BasicCameraMotion<Scalar> motion{};
+  Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign> covariance{Eigen::Matrix<Scalar, 6, 6>::Zero()};  ///< in the tangent order of CameraMotion
   PnpStatistics pnp{};
   MotionDifference difference{};  ///< from the prediction, where there was one
   double sigma_scale{1};
@@ -91,8 +93,10 @@ struct AdmittedFrame {
 template <std::size_t N, std::size_t T = 2 * N>
 class StereoAdmission {
  public:
-  using Camera = StereoCamera<double>;
+  using Scalar = typename StereoPnp<N>::Scalar;
+  using Camera = StereoCamera<Scalar>;
   using Frame = StereoFrame<N>;
+  using Predicted = BasicPredictedMotion<Scalar>;
   using Admitted = AdmittedFrame<N>;
 
   explicit StereoAdmission(const Camera& camera, const AdmissionOptions& options = {})
@@ -102,8 +106,7 @@ class StereoAdmission {
   /// it. Masks are in pixels of the rectified views. A frame that is rejected is no error. Errors: out_of_order, duplicate (time; nothing
   /// but a count changes); invalid_argument (camera or PnP options).
   template <SemanticMask Left = NoMask, SemanticMask Right = NoMask>
-  Status add(const Frame& frame, const std::optional<PredictedMotion>& predicted, Admitted& out, const Left& left = {},
-             const Right& right = {}) {
+  Status add(const Frame& frame, const std::optional<Predicted>& predicted, Admitted& out, const Left& left = {}, const Right& right = {}) {
     out = Admitted{};
     out.time = frame.time;
     if (const Status s = check(camera_); !s) return s;
@@ -139,7 +142,7 @@ class StereoAdmission {
   }
 
   template <class Left, class Right>
-  Status process(const Frame& frame, const std::optional<PredictedMotion>& predicted, Admitted& out, const Left& left, const Right& right) {
+  Status process(const Frame& frame, const std::optional<Predicted>& predicted, Admitted& out, const Left& left, const Right& right) {
     const auto& offered = frame.observations;
     if (offered.empty()) return reject(FrameFate::empty, out);
     for (const StereoObservation& o : offered) (void)out.fates.push_back(screen_one(o, left, right));
@@ -223,7 +226,7 @@ class StereoAdmission {
   }
 
   /// PnP on what was seen in the previous frame too, `step_s` ago; marks outliers, decides on the frame.
-  [[nodiscard]] Status check_motion(const Frame& frame, const std::optional<PredictedMotion>& predicted, double step_s, Admitted& out) {
+  [[nodiscard]] Status check_motion(const Frame& frame, const std::optional<Predicted>& predicted, double step_s, Admitted& out) {
     pairs_.clear();
     order_.clear();  // observation of each pair
     for (std::size_t i = 0; i < frame.observations.size(); ++i) {
@@ -252,7 +255,7 @@ class StereoAdmission {
     return ok_status();
   }
 
-  void judge_motion(const std::optional<PredictedMotion>& predicted, Admitted& out) const {
+  void judge_motion(const std::optional<Predicted>& predicted, Admitted& out) const {
     if (!predicted) {
       out.fate = FrameFate::full_alone, out.decision = FrameDecision::full;
       return;
@@ -268,7 +271,7 @@ class StereoAdmission {
   [[nodiscard]] double median_displacement_px() {
     lengths_.clear();
     for (std::size_t k = 0; k < pairs_.size(); ++k) {
-      const Eigen::Vector3d way = pairs_[k].current_px - pairs_[k].previous_px;
+      const Eigen::Matrix<Scalar, 3, 1> way = pairs_[k].current_px - pairs_[k].previous_px;
       if (pnp_.is_inlier(k)) (void)lengths_.push_back(std::hypot(way[0], way[2]));
     }
     double* const middle = lengths_.begin() + lengths_.size() / 2;

@@ -21,6 +21,7 @@
 
 #include <searvins/core/status.hpp>
 #include <searvins/imu/imu_factor.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/math/so3.hpp>
 #include <searvins/smoother/factor.hpp>
 #include <searvins/smoother/variable.hpp>
@@ -28,9 +29,12 @@
 namespace searvins::vision {
 
 /// See the file comment.
-struct CameraCorrection {
-  using Scalar = double;
-  using Step = Eigen::Vector4d;
+template <class S>
+struct BasicCameraCorrection {
+  using Scalar = S;
+  using Step = Eigen::Matrix<S, 4, 1>;
+  using Vector3 = Eigen::Matrix<S, 3, 1>;
+  using Matrix3 = Eigen::Matrix<S, 3, 3>;
   static constexpr int dof = 4;
   static constexpr smoother::Role role = smoother::Role::chain;
   static constexpr const char* name = "camera correction";
@@ -41,16 +45,16 @@ struct CameraCorrection {
   /// First axis of each part in the tangent vector.
   enum Axis : int { offset = 0, boresight = 1 };
 
-  double time_offset_s{0};                            ///< d
-  Eigen::Matrix3d R_nc{Eigen::Matrix3d::Identity()};  ///< nominal camera axes from true ones
+  S time_offset_s{0};                 ///< d
+  Matrix3 R_nc{Matrix3::Identity()};  ///< nominal camera axes from true ones
 
   /// The turn as a vector about the camera's axes, rad.
-  [[nodiscard]] Eigen::Vector3d boresight_rad() const { return so3::log(R_nc); }
+  [[nodiscard]] Vector3 boresight_rad() const { return so3::log(R_nc); }
 
-  [[nodiscard]] CameraCorrection retract(const Step& step) const {
-    return {time_offset_s + step[offset], R_nc * so3::exp(step.tail<3>())};
+  [[nodiscard]] BasicCameraCorrection retract(const Step& step) const {
+    return {time_offset_s + step[offset], R_nc * so3::exp(step.template tail<3>())};
   }
-  [[nodiscard]] Step local(const CameraCorrection& y) const {
+  [[nodiscard]] Step local(const BasicCameraCorrection& y) const {
     Step step;
     step << y.time_offset_s - time_offset_s, so3::log(R_nc.transpose() * y.R_nc);
     return step;
@@ -59,11 +63,16 @@ struct CameraCorrection {
   [[nodiscard]] static Step linearisation_scale() { return Step::Constant(1e-2); }
 };
 
+using CameraCorrection = BasicCameraCorrection<double>;
+
 /// A correction and how well it is known.
-struct CameraCorrectionEstimate {
-  CameraCorrection value{};
-  Eigen::Matrix<double, 4, 4, Eigen::DontAlign> covariance{Eigen::Matrix4d::Zero()};  ///< in the order of the tangent vector
+template <class Scalar>
+struct BasicCameraCorrectionEstimate {
+  BasicCameraCorrection<Scalar> value{};
+  Eigen::Matrix<Scalar, 4, 4, Eigen::DontAlign> covariance{Eigen::Matrix<Scalar, 4, 4>::Zero()};  ///< in the order of the tangent vector
 };
+
+using CameraCorrectionEstimate = BasicCameraCorrectionEstimate<double>;
 
 /// How well a calibration is trusted, and how steady it is.
 struct CameraCorrectionOptions {
@@ -73,35 +82,43 @@ struct CameraCorrectionOptions {
 };
 
 /// Covariance of the walk over a time.
-[[nodiscard]] inline Eigen::Matrix4d walk_covariance(const CameraCorrectionOptions& options, double duration_s) {
+template <class Scalar = double>
+[[nodiscard]] Eigen::Matrix<Scalar, 4, 4> walk_covariance(const CameraCorrectionOptions& options, double duration_s) {
   const auto variance = [duration_s](double density) { return density * density * duration_s; };
-  Eigen::Vector4d v = Eigen::Vector4d::Constant(variance(options.boresight_walk_rad_sqrt_s));
-  v[CameraCorrection::offset] = variance(options.offset_walk_s_sqrt_s);
+  using Vector4 = Eigen::Matrix<Scalar, 4, 1>;
+  Vector4 v = Vector4::Constant(variance(options.boresight_walk_rad_sqrt_s));
+  v[BasicCameraCorrection<Scalar>::offset] = variance(options.offset_walk_s_sqrt_s);
   return v.asDiagonal();
 }
 /// Covariance before anything was seen.
-[[nodiscard]] inline Eigen::Matrix4d prior_covariance(const CameraCorrectionOptions& options) {
-  Eigen::Vector4d v = Eigen::Vector4d::Constant(options.boresight_sigma_rad * options.boresight_sigma_rad);
-  v[CameraCorrection::offset] = options.offset_sigma_s * options.offset_sigma_s;
+template <class Scalar = double>
+[[nodiscard]] Eigen::Matrix<Scalar, 4, 4> prior_covariance(const CameraCorrectionOptions& options) {
+  using Vector4 = Eigen::Matrix<Scalar, 4, 1>;
+  Vector4 v = Vector4::Constant(options.boresight_sigma_rad * options.boresight_sigma_rad);
+  v[BasicCameraCorrection<Scalar>::offset] = options.offset_sigma_s * options.offset_sigma_s;
   return v.asDiagonal();
 }
 
 /// What is known of a correction from elsewhere; see the file comment.
-struct CameraCorrectionPriorFactor {
-  using Scalar = double;
+template <class S>
+struct BasicCameraCorrectionPriorFactor {
+  using Scalar = S;
+  using Correction = BasicCameraCorrection<S>;
+  using Vector4 = Eigen::Matrix<S, 4, 1>;
+  using Matrix4 = Eigen::Matrix<S, 4, 4>;
   static constexpr int max_rows = 4, max_keys = 1, max_columns = 4;
   static constexpr const char* name = "camera correction prior";
 
-  smoother::Key<CameraCorrection> correction{};
-  CameraCorrection mean{};
-  Eigen::Matrix4d root_information{Eigen::Matrix4d::Identity()};  ///< R, upper triangular
+  smoother::Key<Correction> correction{};
+  Correction mean{};
+  Matrix4 root_information{Matrix4::Identity()};  ///< R, upper triangular
 
   /// Errors: not_positive_definite (also for a NaN).
-  [[nodiscard]] static Result<CameraCorrectionPriorFactor> make(const smoother::Key<CameraCorrection>& correction, const CameraCorrection& mean,
-                                                                const Eigen::Matrix4d& covariance) {
+  [[nodiscard]] static Result<BasicCameraCorrectionPriorFactor> make(const smoother::Key<Correction>& correction, const Correction& mean,
+                                                                     const Matrix4& covariance) {
     const auto root = imu::square_root_information<4>(covariance);
     if (!root) return root.status();
-    return CameraCorrectionPriorFactor{correction, mean, *root};
+    return BasicCameraCorrectionPriorFactor{correction, mean, *root};
   }
 
   [[nodiscard]] int rows() const { return 4; }
@@ -110,35 +127,42 @@ struct CameraCorrectionPriorFactor {
     visit(correction);
   }
   template <class Values>
-  void evaluate(const Values& values, double* e) const {
-    Eigen::Map<Eigen::Vector4d>{e} = root_information * mean.local(values(correction));
+  void evaluate(const Values& values, S* e) const {
+    Eigen::Map<Vector4>{e} = root_information * mean.local(values(correction));
   }
   template <class Values>
-  void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
-    const CameraCorrection::Step r = mean.local(values(correction));
-    Eigen::Map<Eigen::Vector4d>{e} = root_information * r;
-    J.block<4, 1>(0, 0) = root_information.col(0);
-    J.block<4, 3>(0, 1) = root_information.rightCols<3>() * so3::right_jacobian_inverse(r.tail<3>());
+  void linearise(const Values& values, S* e, smoother::JacobianRef<S> J) const {
+    const Vector4 r = mean.local(values(correction));
+    Eigen::Map<Vector4>{e} = root_information * r;
+    J.template block<4, 1>(0, 0) = root_information.col(0);
+    J.template block<4, 3>(0, 1) = root_information.template rightCols<3>() * so3::right_jacobian_inverse(r.template tail<3>());
   }
-  double weigh(const double* e, double* w) const { return smoother::weigh_gaussian(e, 4, w); }
+  S weigh(const S* e, S* w) const { return smoother::weigh_gaussian(e, 4, w); }
 };
 
+using CameraCorrectionPriorFactor = BasicCameraCorrectionPriorFactor<double>;
+
 /// One correction goes over into the next; see the file comment.
-struct CameraCorrectionWalk {
-  using Scalar = double;
+template <class S>
+struct BasicCameraCorrectionWalk {
+  using Scalar = S;
+  using Correction = BasicCameraCorrection<S>;
+  using Vector3 = Eigen::Matrix<S, 3, 1>;
+  using Vector4 = Eigen::Matrix<S, 4, 1>;
   static constexpr int max_rows = 4, max_keys = 2, max_columns = 8;
   static constexpr const char* name = "camera correction walk";
 
-  smoother::Key<CameraCorrection> from{}, to{};
-  Eigen::Vector4d weight{Eigen::Vector4d::Ones()};  ///< 1 / sigma(T)
+  smoother::Key<Correction> from{}, to{};
+  Vector4 weight{Vector4::Ones()};  ///< 1 / sigma(T)
 
   /// Errors: invalid_argument (a duration or a density that is not positive).
-  [[nodiscard]] static Result<CameraCorrectionWalk> make(const smoother::Key<CameraCorrection>& from, const smoother::Key<CameraCorrection>& to,
-                                                         const CameraCorrectionOptions& options, double duration_s) {
-    const Eigen::Vector4d variance = walk_covariance(options, duration_s).diagonal();
+  [[nodiscard]] static Result<BasicCameraCorrectionWalk> make(const smoother::Key<Correction>& from, const smoother::Key<Correction>& to,
+                                                              const CameraCorrectionOptions& options, double duration_s) {
+    const Vector4 variance = walk_covariance<S>(options, duration_s).diagonal();
     if (!(duration_s > 0) || !(variance.minCoeff() > 1e-300) || !variance.allFinite())
-      return failure(StatusCode::invalid_argument, "walk of a camera's correction: time and densities must be positive", -1, -1, duration_s);
-    return CameraCorrectionWalk{from, to, variance.cwiseSqrt().cwiseInverse()};
+      return failure(StatusCode::invalid_argument, "walk of a camera's correction: time and densities must be positive", -1, -1,
+                     duration_s);
+    return BasicCameraCorrectionWalk{from, to, variance.cwiseSqrt().cwiseInverse()};
   }
 
   [[nodiscard]] int rows() const { return 4; }
@@ -147,21 +171,24 @@ struct CameraCorrectionWalk {
     visit(from), visit(to);
   }
   template <class Values>
-  void evaluate(const Values& values, double* e) const {
-    Eigen::Map<Eigen::Vector4d>{e} = weight.cwiseProduct(values(from).local(values(to)));
+  void evaluate(const Values& values, S* e) const {
+    Eigen::Map<Vector4>{e} = weight.cwiseProduct(values(from).local(values(to)));
   }
   template <class Values>
-  void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
-    const CameraCorrection::Step r = values(from).local(values(to));
-    Eigen::Map<Eigen::Vector4d>{e} = weight.cwiseProduct(r);
+  void linearise(const Values& values, S* e, smoother::JacobianRef<S> J) const {
+    const Vector4 r = values(from).local(values(to));
+    Eigen::Map<Vector4>{e} = weight.cwiseProduct(r);
     J(0, 0) = -weight[0], J(0, 4) = weight[0];
-    const Eigen::Vector3d turn = r.tail<3>(), w = weight.tail<3>();
-    J.block<3, 3>(1, 1) = -(w.asDiagonal() * so3::left_jacobian_inverse(turn));
-    J.block<3, 3>(1, 5) = w.asDiagonal() * so3::right_jacobian_inverse(turn);
+    const Vector3 turn = r.template tail<3>(), w = weight.template tail<3>();
+    J.template block<3, 3>(1, 1) = -(w.asDiagonal() * so3::left_jacobian_inverse(turn));
+    J.template block<3, 3>(1, 5) = w.asDiagonal() * so3::right_jacobian_inverse(turn);
   }
-  double weigh(const double* e, double* w) const { return smoother::weigh_gaussian(e, 4, w); }
+  S weigh(const S* e, S* w) const { return smoother::weigh_gaussian(e, 4, w); }
 };
 
-static_assert(smoother::Variable<CameraCorrection> && smoother::Factor<CameraCorrectionPriorFactor> && smoother::Factor<CameraCorrectionWalk>);
+using CameraCorrectionWalk = BasicCameraCorrectionWalk<double>;
+
+static_assert(smoother::Variable<CameraCorrection> && smoother::Factor<CameraCorrectionPriorFactor> &&
+              smoother::Factor<CameraCorrectionWalk>);
 
 }  // namespace searvins::vision

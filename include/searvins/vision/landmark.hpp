@@ -21,9 +21,10 @@
 namespace searvins::vision {
 
 /// A point in w, metres.
-struct Landmark {
-  using Scalar = double;
-  using Step = Eigen::Vector3d;
+template <class S>
+struct BasicLandmark {
+  using Scalar = S;
+  using Step = Eigen::Matrix<S, 3, 1>;
   static constexpr int dof = 3;
   static constexpr smoother::Role role = smoother::Role::local;
   static constexpr const char* name = "landmark";
@@ -31,31 +32,35 @@ struct Landmark {
     constexpr const char* names[] = {"east", "north", "up"};
     return i >= 0 && i < 3 ? names[i] : "?";
   }
-  Eigen::Vector3d p_w_m{Eigen::Vector3d::Zero()};
-  [[nodiscard]] Landmark retract(const Step& d) const { return {p_w_m + d}; }
-  [[nodiscard]] Step local(const Landmark& y) const { return y.p_w_m - p_w_m; }
+  Step p_w_m{Step::Zero()};
+  [[nodiscard]] BasicLandmark retract(const Step& d) const { return {p_w_m + d}; }
+  [[nodiscard]] Step local(const BasicLandmark& y) const { return y.p_w_m - p_w_m; }
   /// At 20 m a metre of depth bends the projection by 1/20 of the step.
   [[nodiscard]] static Step linearisation_scale() { return Step::Ones(); }
 };
 
+using Landmark = BasicLandmark<double>;
+
 /// The weak prior of the file comment.
-struct LandmarkPriorFactor {
-  using Scalar = double;
+template <class S>
+struct BasicLandmarkPriorFactor {
+  using Scalar = S;
+  using Vector3 = Eigen::Matrix<S, 3, 1>;
   static constexpr int max_rows = 3, max_keys = 1, max_columns = 3;
   static constexpr const char* name = "landmark prior";
   static constexpr double kDefaultSigma_m = 30;
 
-  smoother::Key<Landmark> landmark{};
-  Eigen::Vector3d mean_w_m{Eigen::Vector3d::Zero()};
-  double weight_1pm{1 / kDefaultSigma_m};  ///< 1 / sigma
+  smoother::Key<BasicLandmark<S>> landmark{};
+  Vector3 mean_w_m{Vector3::Zero()};
+  S weight_1pm{1 / kDefaultSigma_m};  ///< 1 / sigma
 
   /// Errors: invalid_argument (sigma), non_finite (mean).
-  [[nodiscard]] static Result<LandmarkPriorFactor> make(const smoother::Key<Landmark>& landmark, const Eigen::Vector3d& mean_w_m,
-                                                        double sigma_m = kDefaultSigma_m) {
+  [[nodiscard]] static Result<BasicLandmarkPriorFactor> make(const smoother::Key<BasicLandmark<S>>& landmark, const Vector3& mean_w_m,
+                                                             S sigma_m = kDefaultSigma_m) {
     if (!(sigma_m > 0) || !std::isfinite(1 / sigma_m) || !(1 / sigma_m > 0))
       return failure(StatusCode::invalid_argument, "sigma of a landmark's prior must be positive and finite", -1, -1, sigma_m);
     if (!mean_w_m.allFinite()) return failure(StatusCode::non_finite, "mean of a landmark's prior is not finite");
-    return LandmarkPriorFactor{landmark, mean_w_m, 1 / sigma_m};
+    return BasicLandmarkPriorFactor{landmark, mean_w_m, 1 / sigma_m};
   }
 
   [[nodiscard]] int rows() const { return 3; }
@@ -64,16 +69,18 @@ struct LandmarkPriorFactor {
     visit(landmark);
   }
   template <class Values>
-  void evaluate(const Values& values, double* e) const {
-    Eigen::Map<Eigen::Vector3d>{e} = weight_1pm * (values(landmark).p_w_m - mean_w_m);
+  void evaluate(const Values& values, S* e) const {
+    Eigen::Map<Vector3>{e} = weight_1pm * (values(landmark).p_w_m - mean_w_m);
   }
   template <class Values>
-  void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
+  void linearise(const Values& values, S* e, smoother::JacobianRef<S> J) const {
     evaluate(values, e);
     for (int i = 0; i < 3; ++i) J(i, i) = weight_1pm;
   }
-  double weigh(const double* e, double* w) const { return smoother::weigh_gaussian(e, 3, w); }
+  S weigh(const S* e, S* w) const { return smoother::weigh_gaussian(e, 3, w); }
 };
+
+using LandmarkPriorFactor = BasicLandmarkPriorFactor<double>;
 
 static_assert(smoother::Variable<Landmark> && smoother::Factor<LandmarkPriorFactor>);
 

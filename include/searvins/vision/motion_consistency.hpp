@@ -56,10 +56,13 @@ struct ConsistencyOptions {
 };
 
 /// What the inertial unit says of the camera's motion since the last frame, and how well it knows (tangent order of CameraMotion).
-struct PredictedMotion {
-  CameraMotion motion{};
-  Eigen::Matrix<double, 6, 6, Eigen::DontAlign> covariance{Eigen::Matrix<double, 6, 6>::Zero()};
+template <class Scalar>
+struct BasicPredictedMotion {
+  BasicCameraMotion<Scalar> motion{};
+  Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign> covariance{Eigen::Matrix<Scalar, 6, 6>::Zero()};
 };
+
+using PredictedMotion = BasicPredictedMotion<double>;
 
 /// How far two motions are apart, and how far they may be for `full`.
 struct MotionDifference {
@@ -70,14 +73,13 @@ struct MotionDifference {
 /// `covariance`: of the seen motion. A prediction that is not finite is infinitely far away.
 template <class Scalar = double>
 [[nodiscard]] MotionDifference difference(const BasicCameraMotion<Scalar>& seen, const math::Matrix<Scalar, 6, 6>& covariance,
-                                          const PredictedMotion& predicted, const ConsistencyOptions& options = {}) {
-  const BasicCameraMotion<Scalar>& expected = predicted.motion;
-  const Eigen::Matrix<Scalar, 6, 1> delta = seen.minus(expected);
+                                          const BasicPredictedMotion<Scalar>& predicted, const ConsistencyOptions& options = {}) {
+  const Eigen::Matrix<Scalar, 6, 1> delta = seen.minus(predicted.motion);
   const Eigen::Matrix<Scalar, 6, 6> both = covariance + predicted.covariance;
   MotionDifference d;
   d.turn_rad = delta.template head<3>().norm(), d.way_m = delta.template tail<3>().norm();
   d.turn_bound_rad = options.max_turn_rad + options.noise_sigmas * std::sqrt(both.template topLeftCorner<3, 3>().trace());
-  d.way_bound_m = std::max(options.max_way_m, options.max_way_share * expected.t_prev_cur_m.norm()) +
+  d.way_bound_m = std::max(options.max_way_m, options.max_way_share * predicted.motion.t_prev_cur_m.norm()) +
                   options.noise_sigmas * std::sqrt(both.template bottomRightCorner<3, 3>().trace());
   return d;
 }
