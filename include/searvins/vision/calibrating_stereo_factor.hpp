@@ -26,9 +26,11 @@
 #include <Eigen/Core>
 
 #include <cmath>
+#include <type_traits>
 
 #include <searvins/core/status.hpp>
 #include <searvins/imu/navigation_state.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/math/so3.hpp>
 #include <searvins/robust/loss.hpp>
 #include <searvins/smoother/factor.hpp>
@@ -41,16 +43,17 @@ namespace searvins::vision {
 
 /// How a body moves about a state, and how long after it a frame was stamped.
 struct FrameMotion {
-  double late_s{0};                                          ///< s
-  Eigen::Vector3d v_w_mps{Eigen::Vector3d::Zero()};          ///< velocity of the body
-  Eigen::Vector3d rate_b_radps{Eigen::Vector3d::Zero()};     ///< relative to the Earth
+  double late_s{0};                                       ///< s
+  Eigen::Vector3d v_w_mps{Eigen::Vector3d::Zero()};       ///< velocity of the body
+  Eigen::Vector3d rate_b_radps{Eigen::Vector3d::Zero()};  ///< relative to the Earth
 };
 
 /// Where the body carries the camera in u seconds: its place in the body at the state, by which a frame of u seconds later is seen.
-[[nodiscard]] inline StereoCamera<double> carried(const StereoCamera<double>& camera, double u_s, const Eigen::Vector3d& v_b_mps,
-                                                  const Eigen::Vector3d& rate_b_radps) {
-  StereoCamera<double> there = camera;
-  const Eigen::Matrix3d turn = so3::exp(Eigen::Vector3d{u_s * rate_b_radps});
+template <class Scalar>
+[[nodiscard]] StereoCamera<Scalar> carried(const StereoCamera<Scalar>& camera, std::type_identity_t<Scalar> u_s,
+                                           const math::Vector3<Scalar>& v_b_mps, const math::Vector3<Scalar>& rate_b_radps) {
+  StereoCamera<Scalar> there = camera;
+  const Eigen::Matrix<Scalar, 3, 3> turn = so3::exp(Eigen::Matrix<Scalar, 3, 1>{u_s * rate_b_radps});
   there.p_bc_m = turn * camera.p_bc_m + u_s * v_b_mps;
   there.R_bc = turn * camera.R_bc;
   return there;
@@ -59,9 +62,13 @@ struct FrameMotion {
 /// See the file comment.
 template <robust::Loss Loss = robust::Huber<double>>
 struct CalibratingStereoFactor {
-  using Scalar = double;
-  using State = imu::NavigationState;
-  static constexpr int max_rows = 3, max_keys = 3, max_columns = State::dof + Landmark::dof + CameraCorrection::dof;
+  using Scalar = math::Deferred<double, Loss>;
+  using State = math::Deferred<imu::NavigationState, Loss>;
+  using Correction = BasicCameraCorrection<Scalar>;
+  using Motion = math::Deferred<FrameMotion, Loss>;
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+  static constexpr int max_rows = 3, max_keys = 3, max_columns = State::dof + Landmark::dof + Correction::dof;
   static constexpr const char* name = "stereo, calibrating";
   /// Attitude and position of the state, all of the landmark and of the correction.
   template <class V>
@@ -70,12 +77,12 @@ struct CalibratingStereoFactor {
   }
 
   StereoFactor<Loss> seen{};  ///< by the camera as it was calibrated
-  smoother::Key<CameraCorrection> correction{};
-  FrameMotion motion{};
+  smoother::Key<Correction> correction{};
+  Motion motion{};
 
   /// Errors: those of StereoFactor::make; non_finite (motion).
-  [[nodiscard]] static Result<CalibratingStereoFactor> make(const StereoFactor<Loss>& seen, const smoother::Key<CameraCorrection>& correction,
-                                                            const FrameMotion& motion) {
+  [[nodiscard]] static Result<CalibratingStereoFactor> make(const StereoFactor<Loss>& seen, const smoother::Key<Correction>& correction,
+                                                            const Motion& motion) {
     if (!std::isfinite(motion.late_s) || !motion.v_w_mps.allFinite() || !motion.rate_b_radps.allFinite())
       return failure(StatusCode::non_finite, "motion of the body at a frame is not finite");
     return CalibratingStereoFactor{seen, correction, motion};
@@ -91,36 +98,36 @@ struct CalibratingStereoFactor {
     seen.whiten(see(values).p_c_m, nullptr, e);
   }
   template <class Values>
-  void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
+  void linearise(const Values& values, double* e, smoother::JacobianRef<Scalar> J) const {
     const View view = see(values);
-    Eigen::Matrix3d P;
+    Matrix3 P;
     seen.whiten(view.p_c_m, &P, e);
-    const Eigen::Matrix3d& R_wb = values(seen.state).R_wb;
-    const Eigen::Matrix3d RP = seen.root_information * P;
-    const Eigen::Matrix3d N = RP * (seen.camera.R_bc * values(correction).R_nc).transpose();
-    const Eigen::Matrix3d B = N * view.R_later.transpose(), d_landmark = B * R_wb.transpose();
+    const Matrix3& R_wb = values(seen.state).R_wb;
+    const Matrix3 RP = seen.root_information * P;
+    const Matrix3 N = RP * (seen.camera.R_bc * values(correction).R_nc).transpose();
+    const Matrix3 B = N * view.R_later.transpose(), d_landmark = B * R_wb.transpose();
     constexpr int landmark = State::dof, offset = landmark + Landmark::dof, boresight = offset + 1;
-    J.block<3, 3>(0, State::attitude) = B * so3::skew(view.a_m);
-    J.block<3, 3>(0, State::position) = -d_landmark;
-    J.block<3, 3>(0, landmark) = d_landmark;
-    J.block<3, 1>(0, offset) = N * view.p_b_m.cross(motion.rate_b_radps) - d_landmark * motion.v_w_mps;
-    J.block<3, 3>(0, boresight) = RP * so3::skew(view.p_c_m);
+    J.template block<3, 3>(0, State::attitude) = B * so3::skew(view.a_m);
+    J.template block<3, 3>(0, State::position) = -d_landmark;
+    J.template block<3, 3>(0, landmark) = d_landmark;
+    J.template block<3, 1>(0, offset) = N * view.p_b_m.cross(motion.rate_b_radps) - d_landmark * motion.v_w_mps;
+    J.template block<3, 3>(0, boresight) = RP * so3::skew(view.p_c_m);
   }
   double weigh(const double* e, double* w) const { return seen.weigh(e, w); }
 
  private:
   /// The landmark on its way into the camera.
   struct View {
-    Eigen::Vector3d a_m, p_b_m, p_c_m;
-    Eigen::Matrix3d R_later;  ///< Exp(u w)
+    Vector3 a_m, p_b_m, p_c_m;
+    Matrix3 R_later;  ///< Exp(u w)
   };
   template <class Values>
   [[nodiscard]] View see(const Values& values) const {
     const State& x = values(seen.state);
-    const CameraCorrection& c = values(correction);
+    const Correction& c = values(correction);
     const double u_s = motion.late_s + c.time_offset_s;
     View view;
-    view.R_later = so3::exp(Eigen::Vector3d{u_s * motion.rate_b_radps});
+    view.R_later = so3::exp(Vector3{u_s * motion.rate_b_radps});
     view.a_m = x.R_wb.transpose() * (values(seen.landmark).p_w_m - x.p_wb_m - u_s * motion.v_w_mps);
     view.p_b_m = view.R_later.transpose() * view.a_m;
     view.p_c_m = c.R_nc.transpose() * seen.camera.camera_from_body(view.p_b_m);

@@ -40,6 +40,7 @@
 #include <searvins/core/status.hpp>
 #include <searvins/imu/imu_factor.hpp>
 #include <searvins/imu/navigation_state.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/math/so3.hpp>
 #include <searvins/robust/loss.hpp>
 #include <searvins/smoother/factor.hpp>
@@ -49,7 +50,10 @@
 namespace searvins::vision {
 
 /// Noise of an observation with the same sigma, independent, on uL, uR and v.
-[[nodiscard]] inline Eigen::Matrix3d pixel_covariance_px2(double sigma_px) { return sigma_px * sigma_px * Eigen::Matrix3d::Identity(); }
+template <class Scalar = double>
+[[nodiscard]] Eigen::Matrix<Scalar, 3, 3> pixel_covariance_px2(std::type_identity_t<Scalar> sigma_px) {
+  return sigma_px * sigma_px * Eigen::Matrix<Scalar, 3, 3>::Identity();
+}
 
 /// Which pixels of an observation count.
 enum class Eyes : std::uint8_t { both, left };
@@ -57,8 +61,10 @@ enum class Eyes : std::uint8_t { both, left };
 /// See the file comment.
 template <robust::Loss Loss = robust::Huber<double>>
 struct StereoFactor {
-  using Scalar = double;
-  using State = imu::NavigationState;
+  using Scalar = math::Deferred<double, Loss>;
+  using State = math::Deferred<imu::NavigationState, Loss>;
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
   static constexpr int max_rows = 3, max_keys = 2, max_columns = State::dof + Landmark::dof;
   static constexpr const char* name = "stereo";
   /// Attitude and position of the state, all of the landmark.
@@ -70,9 +76,9 @@ struct StereoFactor {
 
   smoother::Key<State> state{};
   smoother::Key<Landmark> landmark{};
-  StereoCamera<double> camera{};
-  StereoPixel<double> pixel{StereoPixel<double>::Zero()};         ///< z
-  Eigen::Matrix3d root_information{Eigen::Matrix3d::Identity()};  ///< R, upper triangular, 1/px
+  StereoCamera<Scalar> camera{};
+  StereoPixel<Scalar> pixel{StereoPixel<Scalar>::Zero()};  ///< z
+  Matrix3 root_information{Matrix3::Identity()};           ///< R, upper triangular, 1/px
   Loss loss{};
   double tangent_below_m{0};  ///< z_t
 
@@ -80,8 +86,8 @@ struct StereoFactor {
   /// pi_s is continued from.
   /// Errors: invalid_argument (scale), non_finite (pixel), not_positive_definite (covariance, also NaN).
   [[nodiscard]] static Result<StereoFactor> make(const smoother::Key<State>& state, const smoother::Key<Landmark>& landmark,
-                                                 const StereoCamera<double>& camera, const StereoPixel<double>& pixel,
-                                                 const Eigen::Matrix3d& covariance_px2, double support_scale = 1, const Loss& loss = {},
+                                                 const StereoCamera<Scalar>& camera, const StereoPixel<Scalar>& pixel,
+                                                 const Matrix3& covariance_px2, double support_scale = 1, const Loss& loss = {},
                                                  Eyes eyes = Eyes::both) {
     if (!(support_scale >= 1) || !std::isfinite(support_scale))
       return failure(StatusCode::invalid_argument, "scale of a stereo observation's sigma must be 1 or more", -1, -1, support_scale);
@@ -91,7 +97,7 @@ struct StereoFactor {
     const double sigma_px =
         support_scale * std::sqrt(covariance_px2(0, 0) + covariance_px2(1, 1) - covariance_px2(0, 1) - covariance_px2(1, 0));
     const double nearest_px = 2 * std::max(pixel[0] - pixel[1], 0.0) + kGrossSigmas * sigma_px;
-    const Eigen::Matrix3d rows = eyes == Eyes::both ? *root : left_root_information(covariance_px2);
+    const Matrix3 rows = eyes == Eyes::both ? *root : left_root_information(covariance_px2);
     return StereoFactor{state, landmark, camera, pixel, rows / support_scale, loss, camera.depth_m(nearest_px)};
   }
 
@@ -103,17 +109,17 @@ struct StereoFactor {
   template <class Values>
   void evaluate(const Values& values, double* e) const {
     const State& x = values(state);
-    const Eigen::Vector3d p_b = x.R_wb.transpose() * (values(landmark).p_w_m - x.p_wb_m);
+    const Vector3 p_b = x.R_wb.transpose() * (values(landmark).p_w_m - x.p_wb_m);
     whiten(camera.camera_from_body(p_b), nullptr, e);
   }
   template <class Values>
-  void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
+  void linearise(const Values& values, double* e, smoother::JacobianRef<Scalar> J) const {
     const State& x = values(state);
-    const Eigen::Vector3d p_b = x.R_wb.transpose() * (values(landmark).p_w_m - x.p_wb_m);
-    Eigen::Matrix3d P;
+    const Vector3 p_b = x.R_wb.transpose() * (values(landmark).p_w_m - x.p_wb_m);
+    Matrix3 P;
     whiten(camera.camera_from_body(p_b), &P, e);
-    const Eigen::Matrix3d A = root_information * (P * camera.R_bc.transpose());
-    const Eigen::Matrix3d d_landmark = A * x.R_wb.transpose(), d_attitude = A * so3::skew(p_b);
+    const Matrix3 A = root_information * (P * camera.R_bc.transpose());
+    const Matrix3 d_landmark = A * x.R_wb.transpose(), d_attitude = A * so3::skew(p_b);
     for (int c = 0; c < 3; ++c)
       for (int i = 0; i < 3; ++i) {
         J(i, State::attitude + c) = d_attitude(i, c);
@@ -127,16 +133,16 @@ struct StereoFactor {
     return loss.rho(z2);
   }
   /// e of a landmark at p_c in camera axes and, if asked, d pi_s / d p_c.
-  void whiten(const Eigen::Vector3d& p_c_m, Eigen::Matrix3d* d_p_c, double* e) const {
-    Eigen::Map<Eigen::Vector3d>{e} = root_information * (camera.continued(p_c_m, d_p_c, tangent_below_m) - pixel);
+  void whiten(const Vector3& p_c_m, Matrix3* d_p_c, double* e) const {
+    Eigen::Map<Vector3>{e} = root_information * (camera.continued(p_c_m, d_p_c, tangent_below_m) - pixel);
   }
 
  private:
   /// R of (uL, v) in the rows and columns of uL and v: the factor of [a b; b c], inverted.
-  [[nodiscard]] static Eigen::Matrix3d left_root_information(const Eigen::Matrix3d& covariance_px2) {
+  [[nodiscard]] static Matrix3 left_root_information(const Matrix3& covariance_px2) {
     const double a = covariance_px2(0, 0), b = covariance_px2(2, 0), c = covariance_px2(2, 2);
     const double root_c = std::sqrt(c), root_a = std::sqrt(a - b * b / c);
-    Eigen::Matrix3d R = Eigen::Matrix3d::Zero();
+    Matrix3 R = Matrix3::Zero();
     R(0, 0) = 1 / root_a, R(0, 2) = -b / (c * root_a), R(2, 2) = 1 / root_c;
     return R;
   }
