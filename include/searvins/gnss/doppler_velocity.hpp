@@ -29,6 +29,7 @@
 #include <searvins/gnss/range.hpp>
 #include <searvins/gnss/satellite.hpp>
 #include <searvins/gnss/weighting.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/math/quantiles.hpp>
 #include <searvins/math/small_cholesky.hpp>
 #include <searvins/robust/loss.hpp>
@@ -51,75 +52,92 @@ struct VelocityPrior {
   Eigen::Matrix3d information{Eigen::Matrix3d::Zero()};  ///< (m/s)^-2
 };
 
-/// One range rate, used or not.
-struct DopplerRow {
+/// One range rate, used or not. Scalar: double or wider, as in everything here.
+template <class Scalar>
+struct BasicDopplerRow {
+  using Direction = Eigen::Matrix<Scalar, 4, 1, Eigen::DontAlign>;
+
   SatelliteId satellite{};
   SignalCode signal{};
   bool used{true};
   double rate_mps{0};  ///< measured, satellite clock removed, minus that of a receiver at rest
   double sigma_mps{0};
-  double residual_mps{0};                              ///< at the solution
-  Eigen::Matrix<double, 4, 1, Eigen::DontAlign> direction{Eigen::Vector4d::Zero()};  ///< d rate / d (velocity, drift)
+  double residual_mps{0};                  ///< at the solution
+  Direction direction{Direction::Zero()};  ///< d rate / d (velocity, drift)
 };
+
+using DopplerRow = BasicDopplerRow<double>;  ///< of doubles
 
 inline constexpr std::size_t kMaxDopplerRows = 2 * kMaxSatellitesPerEpoch;  ///< Dopplers of one solution
 
 /// Velocity and drift of one epoch.
-struct DopplerVelocity {
-  Eigen::Vector3d velocity_e_mps{Eigen::Vector3d::Zero()};
-  double drift_mps{0};                                  ///< c times the rate of the receiver clock
-  Eigen::Matrix<double, 4, 4, Eigen::DontAlign> covariance{Eigen::Matrix4d::Zero()};  ///< of (velocity, drift); scaled up when the chi-square test fails
-  StaticVector<DopplerRow, kMaxDopplerRows> rows{};
+template <class Scalar>
+struct BasicDopplerVelocity {
+  using Vector3 = math::Vector3<Scalar>;
+  using Covariance = Eigen::Matrix<Scalar, 4, 4, Eigen::DontAlign>;
+
+  Vector3 velocity_e_mps{Vector3::Zero()};
+  double drift_mps{0};                        ///< c times the rate of the receiver clock
+  Covariance covariance{Covariance::Zero()};  ///< of (velocity, drift); scaled up when the chi-square test fails
+  StaticVector<BasicDopplerRow<Scalar>, kMaxDopplerRows> rows{};
   int used{0}, excluded{0};
   double chi_square{0};
   int redundancy{0};
   bool consistent{false};  ///< the chi-square test was passed, with redundancy
 
-  [[nodiscard]] Eigen::Matrix3d velocity_covariance_m2ps2() const { return covariance.topLeftCorner<3, 3>(); }
+  [[nodiscard]] math::Matrix3<Scalar> velocity_covariance_m2ps2() const { return covariance.template topLeftCorner<3, 3>(); }
 };
+
+using DopplerVelocity = BasicDopplerVelocity<double>;  ///< of doubles
 
 namespace detail {
 
 /// Weighted least squares over the used rows. False when the geometry does not determine the four unknowns.
-template <class Weight>
-[[nodiscard]] bool solve_doppler(const DopplerVelocity& d, const VelocityPrior& prior, Weight weight, Eigen::Vector4d& x,
-                                 Eigen::Matrix<double, 4, 4, Eigen::DontAlign>* covariance = nullptr) {
-  Eigen::Matrix4d N = Eigen::Matrix4d::Zero();
-  Eigen::Vector4d g = Eigen::Vector4d::Zero();
-  N.topLeftCorner<3, 3>() = prior.information;
-  g.head<3>() = prior.information * prior.velocity_e_mps;
-  for (const DopplerRow& r : d.rows) {
+template <class Scalar, class Weight>
+[[nodiscard]] bool solve_doppler(const BasicDopplerVelocity<Scalar>& d, const VelocityPrior& prior, Weight weight,
+                                 Eigen::Matrix<Scalar, 4, 1>& x, Eigen::Matrix<Scalar, 4, 4, Eigen::DontAlign>* covariance = nullptr) {
+  using Vector4 = Eigen::Matrix<Scalar, 4, 1>;
+  using Matrix4 = Eigen::Matrix<Scalar, 4, 4>;
+  const math::Matrix3<Scalar> information = prior.information;
+  Matrix4 N = Matrix4::Zero();
+  Vector4 g = Vector4::Zero();
+  N.template topLeftCorner<3, 3>() = information;
+  g.template head<3>() = information * prior.velocity_e_mps;
+  for (const auto& r : d.rows) {
     if (!r.used) continue;
     const double w = weight(r) / (r.sigma_mps * r.sigma_mps);
     N.noalias() += w * r.direction * r.direction.transpose();
     g += w * r.rate_mps * r.direction;
   }
-  const math::SmallCholesky<4> factor(N);
+  const math::SmallCholesky<4, Scalar> factor(N);
   if (!factor.ok()) return false;
   x = factor.solve(g);
   if (covariance) *covariance = factor.inverse();
   return x.allFinite();
 }
 
-[[nodiscard]] inline double standardised(const DopplerRow& r, const Eigen::Vector4d& x) {
+template <class Scalar>
+[[nodiscard]] double standardised(const BasicDopplerRow<Scalar>& r, const Eigen::Matrix<Scalar, 4, 1>& x) {
   return (r.rate_mps - r.direction.dot(x)) / r.sigma_mps;
 }
 
 /// Graduated Geman-McClure weights from the plain solution down to two sigma, one constellation (kConstellations: none) left out while the
 /// scale is coarse. Returns the robust cost, infinite when the geometry fails.
-[[nodiscard]] inline double descend_doppler(const DopplerVelocity& d, const VelocityPrior& prior, std::size_t without, Eigen::Vector4d& x) {
+template <class Scalar>
+[[nodiscard]] double descend_doppler(const BasicDopplerVelocity<Scalar>& d, const VelocityPrior& prior, std::size_t without,
+                                     Eigen::Matrix<Scalar, 4, 1>& x) {
   constexpr double failed = std::numeric_limits<double>::infinity(), final_scale = 2;
-  const auto left_out = [&](const DopplerRow& r) { return static_cast<std::size_t>(r.satellite.constellation) == without; };
+  const auto left_out = [&](const auto& r) { return static_cast<std::size_t>(r.satellite.constellation) == without; };
   if (!solve_doppler(
-          d, prior, [&](const DopplerRow& r) { return left_out(r) ? 1e-6 : 1.0; }, x))
+          d, prior, [&](const auto& r) { return left_out(r) ? 1e-6 : 1.0; }, x))
     return failed;
   double c = final_scale;
-  for (const DopplerRow& r : d.rows) c = std::max(c, std::abs(standardised(r, x)));
+  for (const auto& r : d.rows) c = std::max(c, std::abs(standardised(r, x)));
   for (int settled = 0, i = 0; settled < 5 && i < 60; ++i) {
     const robust::GemanMcClure<double> loss{c};
-    const Eigen::Vector4d at = x;
+    const Eigen::Matrix<Scalar, 4, 1> at = x;
     const bool coarse = c > final_scale;
-    const auto weight = [&](const DopplerRow& r) {
+    const auto weight = [&](const auto& r) {
       const double z = standardised(r, at);
       return coarse && left_out(r) ? 1e-6 : loss.weight(z * z);
     };
@@ -128,17 +146,18 @@ template <class Weight>
     c = std::max(final_scale, 0.6 * c);
   }
   const robust::GemanMcClure<double> loss{final_scale};
-  const Eigen::Vector3d off = x.head<3>() - prior.velocity_e_mps;
+  const math::Vector3<Scalar> off = x.template head<3>() - prior.velocity_e_mps;
   double cost = 0.5 * off.dot(prior.information * off);
-  for (const DopplerRow& r : d.rows) cost += loss.rho(standardised(r, x) * standardised(r, x));
+  for (const auto& r : d.rows) cost += loss.rho(standardised(r, x) * standardised(r, x));
   return cost;
 }
 
 /// The descent of least cost: with all satellites, or with a constellation left out at first.
-[[nodiscard]] inline bool best_doppler(const DopplerVelocity& d, const VelocityPrior& prior, Eigen::Vector4d& best) {
+template <class Scalar>
+[[nodiscard]] bool best_doppler(const BasicDopplerVelocity<Scalar>& d, const VelocityPrior& prior, Eigen::Matrix<Scalar, 4, 1>& best) {
   double best_cost = std::numeric_limits<double>::infinity();
   for (std::size_t without = 0; without <= kConstellations; ++without) {
-    Eigen::Vector4d x;
+    Eigen::Matrix<Scalar, 4, 1> x;
     const double cost = descend_doppler(d, prior, without, x);
     if (cost < best_cost) best = x, best_cost = cost;
   }
@@ -146,19 +165,20 @@ template <class Weight>
 }
 
 /// Excludes rows until the chi-square test passes or there is no redundancy left; x and covariance are of what is left.
-[[nodiscard]] inline Status exclude_doppler_outliers(const DopplerOptions& options, const VelocityPrior& prior, DopplerVelocity& d,
-                                                     Eigen::Vector4d& x) {
-  for (DopplerRow& r : d.rows) r.used = std::abs(standardised(r, x)) <= options.outlier_sigmas;
+template <class Scalar>
+[[nodiscard]] Status exclude_doppler_outliers(const DopplerOptions& options, const VelocityPrior& prior, BasicDopplerVelocity<Scalar>& d,
+                                              Eigen::Matrix<Scalar, 4, 1>& x) {
+  for (auto& r : d.rows) r.used = std::abs(standardised(r, x)) <= options.outlier_sigmas;
   for (;;) {
-    const int used = static_cast<int>(std::count_if(d.rows.begin(), d.rows.end(), [](const DopplerRow& r) { return r.used; }));
+    const int used = static_cast<int>(std::count_if(d.rows.begin(), d.rows.end(), [](const auto& r) { return r.used; }));
     if (used < 4) return failure(StatusCode::too_few, "Doppler velocity: too few range rates agree", used, 4);
     if (!solve_doppler(
-            d, prior, [](const DopplerRow&) { return 1.0; }, x, &d.covariance))
+            d, prior, [](const auto&) { return 1.0; }, x, &d.covariance))
       return failure(StatusCode::under_determined, "Doppler velocity: the satellites that agree do not determine a velocity");
     d.used = used, d.redundancy = used - 4, d.chi_square = 0;
-    DopplerRow* worst = nullptr;
+    BasicDopplerRow<Scalar>* worst = nullptr;
     double largest = 0;
-    for (DopplerRow& r : d.rows) {
+    for (auto& r : d.rows) {
       if (!r.used) continue;
       const double z = standardised(r, x), own_share = r.direction.dot(d.covariance * r.direction) / (r.sigma_mps * r.sigma_mps);
       d.chi_square += z * z;
@@ -178,12 +198,14 @@ template <class Weight>
 /// Velocity at an epoch whose position is roughly known. Every Doppler that passes the screens takes part, up to two carriers a
 /// satellite. A prior with zero information (the default) is none. Errors: non_finite (position), too_few (fewer than four range rates,
 /// or than four that agree), under_determined (geometry).
-template <std::size_t N>
-[[nodiscard]] Result<DopplerVelocity> solve_doppler_velocity(const ObservationEpoch& epoch, const EphemerisStore<N>& store,
-                                                             const Eigen::Vector3d& position_e_m, const DopplerOptions& options = {},
-                                                             const VelocityPrior& prior = {}) {
+template <class Scalar = double, std::size_t N>
+[[nodiscard]] Result<BasicDopplerVelocity<Scalar>> solve_doppler_velocity(const ObservationEpoch& epoch, const EphemerisStore<N>& store,
+                                                                          const math::Vector3<Scalar>& position_e_m,
+                                                                          const DopplerOptions& options = {},
+                                                                          const VelocityPrior& prior = {}) {
+  using Vector3 = math::Vector3<Scalar>;
   if (!position_e_m.allFinite()) return failure(StatusCode::non_finite, "Doppler velocity: position is not finite");
-  DopplerVelocity d;
+  BasicDopplerVelocity<Scalar> d;
   for (const SatelliteObservation& s : epoch.satellites) {
     std::array<char, 2> bands{};
     std::size_t taken = 0;
@@ -194,11 +216,10 @@ template <std::size_t N>
       if (!t) continue;
       const double elevation_rad = geodesy::azimuth_elevation(position_e_m, t->state.position_e_m).elevation_rad;
       if (!high_enough(elevation_rad, options.screening)) continue;
-      DopplerRow r;
+      BasicDopplerRow<Scalar> r;
       r.satellite = s.satellite, r.signal = o.signal;
-      Eigen::Vector3d d_rate_d_v;
-      const double at_rest_mps =
-          range_rate_mps(position_e_m, Eigen::Vector3d::Zero(), t->state.position_e_m, t->state.velocity_e_mps, &d_rate_d_v);
+      Vector3 d_rate_d_v;
+      const double at_rest_mps = range_rate_mps(position_e_m, Vector3::Zero(), t->state.position_e_m, t->state.velocity_e_mps, &d_rate_d_v);
       r.rate_mps = -wavelength_m(o.signal) * o.doppler_hz + kSpeedOfLightMps * t->state.clock_rate_sps - at_rest_mps;
       r.direction << d_rate_d_v, 1.0;
       r.sigma_mps = options.sigma_mps * std::sqrt(cn0_variance_factor(o.cn0_dbhz, options.cn0_decade_db)) / std::sin(elevation_rad);
@@ -208,14 +229,14 @@ template <std::size_t N>
   if (d.rows.size() < 4)
     return failure(StatusCode::too_few, "Doppler velocity: fewer than four range rates", static_cast<int>(d.rows.size()), 4);
 
-  Eigen::Vector4d x;
+  Eigen::Matrix<Scalar, 4, 1> x;
   if (!detail::best_doppler(d, prior, x))
     return failure(StatusCode::under_determined, "Doppler velocity: the satellites do not determine a velocity");
   if (const Status s = detail::exclude_doppler_outliers(options, prior, d, x); !s) return s;
-  for (DopplerRow& r : d.rows) r.residual_mps = r.rate_mps - r.direction.dot(x);
+  for (auto& r : d.rows) r.residual_mps = r.rate_mps - r.direction.dot(x);
   d.excluded = static_cast<int>(d.rows.size()) - d.used;
   if (!d.consistent && d.redundancy > 0) d.covariance *= std::max(1.0, d.chi_square / d.redundancy);
-  d.velocity_e_mps = x.head<3>();
+  d.velocity_e_mps = x.template head<3>();
   d.drift_mps = x[3];
   return d;
 }

@@ -23,40 +23,46 @@
 
 #include <searvins/geodesy/wgs84.hpp>
 #include <searvins/gnss/signal.hpp>
+#include <searvins/math/deferred.hpp>
 
 namespace searvins::gnss {
 
 /// Coordinates, in the ECEF axes `flight_s` later, of a point or a velocity given in ECEF axes: Rz(omega_e flight_s) v.
-[[nodiscard]] inline Eigen::Vector3d in_axes_after(const Eigen::Vector3d& v_e, double flight_s) {
+template <class Scalar = double>
+[[nodiscard]] math::Vector3<Scalar> in_axes_after(const math::Vector3<Scalar>& v_e, double flight_s) {
   const double theta = geodesy::kEarthRateRadps * flight_s, c = std::cos(theta), s = std::sin(theta);
   return {c * v_e.x() + s * v_e.y(), c * v_e.y() - s * v_e.x(), v_e.z()};
 }
 
 /// Range in metres from the satellite (ECEF at transmission) to the receiver (ECEF at reception). Optionally d range / d p.
 /// The two points must differ.
-[[nodiscard]] inline double range_m(const Eigen::Vector3d& p_e_m, const Eigen::Vector3d& satellite_e_m,
-                                    Eigen::Vector3d* d_range_d_p = nullptr) {
+template <class Scalar = double>
+[[nodiscard]] double range_m(const math::Vector3<Scalar>& p_e_m, const math::Vector3<Scalar>& satellite_e_m,
+                             math::Vector3<Scalar>* d_range_d_p = nullptr) {
   constexpr double k = geodesy::kEarthRateRadps / kSpeedOfLightMps;
-  const Eigen::Vector3d line = p_e_m - satellite_e_m;
+  const math::Vector3<Scalar> line = p_e_m - satellite_e_m;
   const double distance_m = line.norm();
-  if (d_range_d_p) *d_range_d_p = line / distance_m + Eigen::Vector3d{-k * satellite_e_m.y(), k * satellite_e_m.x(), 0.0};
+  if (d_range_d_p) *d_range_d_p = line / distance_m + math::Vector3<Scalar>{-k * satellite_e_m.y(), k * satellite_e_m.x(), 0.0};
   return distance_m + k * (satellite_e_m.x() * p_e_m.y() - satellite_e_m.y() * p_e_m.x());
 }
 
 /// Unit vector from the satellite to the receiver, in ECEF axes at reception.
-[[nodiscard]] inline Eigen::Vector3d direction_from_satellite(const Eigen::Vector3d& p_e_m, const Eigen::Vector3d& satellite_e_m) {
-  const Eigen::Vector3d rotated_e_m = in_axes_after(satellite_e_m, (p_e_m - satellite_e_m).norm() / kSpeedOfLightMps);
+template <class Scalar = double>
+[[nodiscard]] math::Vector3<Scalar> direction_from_satellite(const math::Vector3<Scalar>& p_e_m,
+                                                             const math::Vector3<Scalar>& satellite_e_m) {
+  const math::Vector3<Scalar> rotated_e_m = in_axes_after<Scalar>(satellite_e_m, (p_e_m - satellite_e_m).norm() / kSpeedOfLightMps);
   return (p_e_m - rotated_e_m).normalized();
 }
 
 /// Range rate in m/s, positive when the satellite recedes, clocks excluded. Velocities are relative to ECEF: the receiver's at reception,
 /// the satellite's at transmission. Optionally d rate / d v (receiver velocity).
-[[nodiscard]] inline double range_rate_mps(const Eigen::Vector3d& p_e_m, const Eigen::Vector3d& v_e_mps,
-                                           const Eigen::Vector3d& satellite_e_m, const Eigen::Vector3d& satellite_v_e_mps,
-                                           Eigen::Vector3d* d_rate_d_v = nullptr) {
+template <class Scalar = double>
+[[nodiscard]] double range_rate_mps(const math::Vector3<Scalar>& p_e_m, const math::Vector3<Scalar>& v_e_mps,
+                                    const math::Vector3<Scalar>& satellite_e_m, const math::Vector3<Scalar>& satellite_v_e_mps,
+                                    math::Vector3<Scalar>* d_rate_d_v = nullptr) {
   const double flight_s = (p_e_m - satellite_e_m).norm() / kSpeedOfLightMps;
-  const Eigen::Vector3d S = in_axes_after(satellite_e_m, flight_s), u = (p_e_m - S).normalized();
-  const double toward_mps = u.dot(in_axes_after(satellite_v_e_mps, flight_s));
+  const math::Vector3<Scalar> S = in_axes_after<Scalar>(satellite_e_m, flight_s), u = (p_e_m - S).normalized();
+  const double toward_mps = u.dot(in_axes_after<Scalar>(satellite_v_e_mps, flight_s));
   const double turning_mps = geodesy::kEarthRateRadps * (u.y() * S.x() - u.x() * S.y());  // u' (omega x S)
   const double scale = 1.0 / (1.0 - (toward_mps + turning_mps) / kSpeedOfLightMps);
   if (d_rate_d_v) *d_rate_d_v = scale * u;

@@ -27,6 +27,7 @@
 #include <searvins/core/time.hpp>
 #include <searvins/gnss/ephemeris.hpp>
 #include <searvins/gnss/signal.hpp>
+#include <searvins/math/deferred.hpp>
 
 namespace searvins::gnss {
 
@@ -90,7 +91,8 @@ struct OrbitalPoint {
   double node, node_rate;
 };
 
-inline void to_node_frame(const OrbitalPoint& o, Eigen::Vector3d& p, Eigen::Vector3d& v) {
+template <class Scalar>
+void to_node_frame(const OrbitalPoint& o, Eigen::Matrix<Scalar, 3, 1>& p, Eigen::Matrix<Scalar, 3, 1>& v) {
   const double cn = std::cos(o.node), sn = std::sin(o.node), ci = std::cos(o.inclination), si = std::sin(o.inclination);
   const double across = o.y * ci, across_rate = o.y_rate * ci - o.y * si * o.inclination_rate;
   p = {o.x * cn - across * sn, o.x * sn + across * cn, o.y * si};
@@ -99,15 +101,17 @@ inline void to_node_frame(const OrbitalPoint& o, Eigen::Vector3d& p, Eigen::Vect
 }
 
 /// From the tilted, non-rotating frame of BeiDou's geostationary orbits to ECEF at t = toe + tk.
-inline void geostationary_to_ecef(double turn_rad, double earth_rate_radps, Eigen::Vector3d& p, Eigen::Vector3d& v) {
+template <class Scalar>
+void geostationary_to_ecef(double turn_rad, double earth_rate_radps, Eigen::Matrix<Scalar, 3, 1>& p, Eigen::Matrix<Scalar, 3, 1>& v) {
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
   constexpr double tilt = -5.0 * std::numbers::pi / 180.0;
   const double ct = std::cos(tilt), st = std::sin(tilt), c = std::cos(turn_rad), s = std::sin(turn_rad);
-  const auto turn = [&](const Eigen::Vector3d& a) {
+  const auto turn = [&](const Vector3& a) {
     const double y = ct * a.y() + st * a.z(), z = ct * a.z() - st * a.y();
-    return Eigen::Vector3d{c * a.x() + s * y, c * y - s * a.x(), z};
+    return Vector3{c * a.x() + s * y, c * y - s * a.x(), z};
   };
   p = turn(p);
-  v = turn(v) + earth_rate_radps * Eigen::Vector3d{p.y(), -p.x(), 0.0};
+  v = turn(v) + earth_rate_radps * Vector3{p.y(), -p.x(), 0.0};
 }
 
 /// One-sigma range error of a broadcast record that states no accuracy, metres.
@@ -118,7 +122,8 @@ inline constexpr double kUnknownAccuracyM = 3.0;
 /// Where the satellite is at `t` (GPS time) according to one record; the age of the record is the caller's business (EphemerisPolicy).
 /// Errors: invalid_argument (orbit outside sqrt(a) 4000..8000, eccentricity 0..0.5,
 /// clock over 1 s off), non_finite (a field is not finite).
-[[nodiscard]] inline Result<SatelliteState> satellite_state(const Ephemeris& e, GpsTime t) {
+template <class Scalar = double>
+[[nodiscard]] Result<SatelliteState> satellite_state(const Ephemeris& e, GpsTime t) {
   if (!(e.sqrt_a > 4000 && e.sqrt_a < 8000))
     return failure(StatusCode::invalid_argument, "ephemeris: sqrt(a) is not that of a navigation satellite", -1, -1, e.sqrt_a);
   if (!(e.eccentricity >= 0 && e.eccentricity < 0.5))
@@ -145,16 +150,19 @@ inline constexpr double kUnknownAccuracyM = 3.0;
   o.node_rate = e.omega_dot - (geostationary ? 0.0 : k.earth_rate_radps);
   o.node = e.omega0 + o.node_rate * tk - k.earth_rate_radps * detail::toe_of_week_s(e);
 
+  math::Vector3<Scalar> p_e_m, v_e_mps;
+  detail::to_node_frame(o, p_e_m, v_e_mps);
+  if (geostationary) detail::geostationary_to_ecef(k.earth_rate_radps * tk, k.earth_rate_radps, p_e_m, v_e_mps);
+
   SatelliteState s;
-  detail::to_node_frame(o, s.position_e_m, s.velocity_e_mps);
-  if (geostationary) detail::geostationary_to_ecef(k.earth_rate_radps * tk, k.earth_rate_radps, s.position_e_m, s.velocity_e_mps);
+  s.position_e_m = p_e_m, s.velocity_e_mps = v_e_mps;
 
   const double dt = seconds_between(e.toc, t), relativity = k.relativity_s_per_sqrt_m * e.eccentricity * e.sqrt_a;
   s.clock_s = e.af0 + dt * (e.af1 + dt * e.af2) + relativity * sE;
   s.clock_rate_sps = e.af1 + 2 * e.af2 * dt + relativity * cE * E_rate;
   const double accuracy_m = e.accuracy_m > 0 ? e.accuracy_m : detail::kUnknownAccuracyM;
   s.variance_m2 = accuracy_m * accuracy_m;
-  if (!(s.position_e_m.allFinite() && s.velocity_e_mps.allFinite() && std::isfinite(s.clock_s) && std::isfinite(s.clock_rate_sps)))
+  if (!(p_e_m.allFinite() && v_e_mps.allFinite() && std::isfinite(s.clock_s) && std::isfinite(s.clock_rate_sps)))
     return failure(StatusCode::non_finite, "ephemeris: a field is not finite");
   if (std::abs(s.clock_s) > 1)
     return failure(StatusCode::invalid_argument, "ephemeris: satellite clock over a second off", -1, -1, s.clock_s);
@@ -194,6 +202,7 @@ inline constexpr double kUnknownAccuracyM = 3.0;
 template <std::size_t N>
 [[nodiscard]] Result<Transmission> transmission_from_code(const EphemerisStore<N>& store, SatelliteId id, GpsTime receiver_tag,
                                                           double code_m, const EphemerisPolicy& policy = {}) {
+  using Scalar = math::DeferredFor<double, N>;
   if (!std::isfinite(code_m)) return failure(StatusCode::non_finite, "pseudorange is not finite");
   if (std::abs(code_m) > 10 * kSpeedOfLightMps)
     return failure(StatusCode::invalid_argument, "pseudorange over ten light seconds", -1, -1, code_m);
@@ -201,10 +210,10 @@ template <std::size_t N>
   const Ephemeris* e = store.select(id, satellite_reading, policy);
   if (!e) return failure(StatusCode::no_data, "no healthy ephemeris of sufficient age for the satellite", id.number);
   // The clock moves by less than 1 ps during its own offset, so its value at the satellite's reading is that at transmission.
-  Result<SatelliteState> state = satellite_state(*e, satellite_reading);
+  Result<SatelliteState> state = satellite_state<Scalar>(*e, satellite_reading);
   if (!state) return state.status();
   const GpsTime t = satellite_reading.plus_seconds(-state->clock_s);
-  state = satellite_state(*e, t);
+  state = satellite_state<Scalar>(*e, t);
   if (!state) return state.status();
   return Transmission{t, *state, e};
 }

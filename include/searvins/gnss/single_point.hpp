@@ -31,6 +31,7 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <type_traits>
 
 #include <searvins/core/static_vector.hpp>
 #include <searvins/core/status.hpp>
@@ -40,6 +41,7 @@
 #include <searvins/gnss/signal.hpp>
 #include <searvins/gnss/single_point_problem.hpp>
 #include <searvins/gnss/single_point_solution.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/math/quantiles.hpp>
 #include <searvins/math/small_cholesky.hpp>
 
@@ -47,11 +49,12 @@ namespace searvins::gnss {
 namespace detail {
 
 /// Lowest robust cost of descents from x0: as it is, without each constellation, and hugging the earliest codes; x0 becomes that solution.
-[[nodiscard]] inline double best_descent(const SinglePointProblem& problem, SinglePointVector& x0) {
-  SinglePointVector best = x0;
+template <class Scalar>
+[[nodiscard]] double best_descent(const BasicSinglePointProblem<Scalar>& problem, BasicSinglePointVector<Scalar>& x0) {
+  BasicSinglePointVector<Scalar> best = x0;
   double best_cost = std::numeric_limits<double>::infinity();
   const auto attempt = [&](std::size_t without, double lateness) {
-    SinglePointVector x = x0;
+    BasicSinglePointVector<Scalar> x = x0;
     const double cost = problem.descend(x, without, lateness);
     if (cost < best_cost) best = x, best_cost = cost;
   };
@@ -62,8 +65,9 @@ namespace detail {
 }
 
 /// Removes outliers from x until the chi-square test passes or nothing can be checked any more; x and covariance are of what is left.
-[[nodiscard]] inline Status exclude_outliers(SinglePointProblem& problem, const SinglePointOptions& options, SinglePointVector& x,
-                                             SinglePointSolution& out) {
+template <class Scalar>
+[[nodiscard]] Status exclude_outliers(BasicSinglePointProblem<Scalar>& problem, const SinglePointOptions& options,
+                                      BasicSinglePointVector<Scalar>& x, BasicSinglePointSolution<Scalar>& out) {
   for (int round = 0; round < 2; ++round) {
     problem.select(x);
     for (std::size_t i = 0; i <= kMaxCodeRows; ++i) {
@@ -86,28 +90,33 @@ namespace detail {
 }
 
 /// sqrt trace of (A'A)^-1 with one clock for all; infinite when singular.
-[[nodiscard]] inline double dilution(const SinglePointSolution& s) {
-  Eigen::Matrix4d N = Eigen::Matrix4d::Zero();
+template <class Scalar>
+[[nodiscard]] double dilution(const BasicSinglePointSolution<Scalar>& s) {
+  using Vector4 = Eigen::Matrix<Scalar, 4, 1>;
+  using Matrix4 = Eigen::Matrix<Scalar, 4, 4>;
+  Matrix4 N = Matrix4::Zero();
   for (const CodeRow& r : s.rows) {
     if (r.fate != CodeFate::used) continue;
-    Eigen::Vector4d a;
-    a << SinglePointProblem::direction(s.state, r).head<3>(), 1.0;
+    Vector4 a;
+    a << BasicSinglePointProblem<Scalar>::direction(s.state, r).template head<3>(), 1.0;
     N.noalias() += a * a.transpose();
   }
-  const math::SmallCholesky<4> factor(N);
+  const math::SmallCholesky<4, Scalar> factor(N);
   return factor.ok() ? std::sqrt(factor.inverse().trace()) : std::numeric_limits<double>::infinity();
 }
 
-inline void report(const SinglePointProblem& problem, GpsTime tag, const SinglePointVector& x, SinglePointSolution& out) {
+template <class Scalar>
+void report(const BasicSinglePointProblem<Scalar>& problem, GpsTime tag, const BasicSinglePointVector<Scalar>& x,
+            BasicSinglePointSolution<Scalar>& out) {
   out.state = x;
-  out.position_e_m = x.head<3>();
+  out.position_e_m = x.template head<3>();
   double clock_sum_m = 0;
   for (CodeRow& r : out.rows) {
     if (r.fate == CodeFate::used || r.fate == CodeFate::outlier || r.fate == CodeFate::low) r.residual_m = problem.residual_m(x, r);
     out.excluded += r.fate == CodeFate::outlier;
     if (r.fate != CodeFate::used) continue;
     ++out.used;
-    clock_sum_m += x[SinglePointProblem::clock_index(r)];
+    clock_sum_m += x[BasicSinglePointProblem<Scalar>::clock_index(r)];
     out.constellation_used[static_cast<std::size_t>(r.satellite.constellation)] = true;
   }
   for (std::size_t c = 0; c < kConstellations; ++c) out.clock_s[c] = x[3 + static_cast<int>(c)] / kSpeedOfLightMps;
@@ -117,8 +126,9 @@ inline void report(const SinglePointProblem& problem, GpsTime tag, const SingleP
 }
 
 /// The middle one of the residuals of a constellation (nullptr: of all) at x; 0 without rows.
-[[nodiscard]] inline double median_residual_m(const SinglePointProblem& problem, const SinglePointSolution& s, const SinglePointVector& x,
-                                              const Constellation* of) {
+template <class Scalar>
+[[nodiscard]] double median_residual_m(const BasicSinglePointProblem<Scalar>& problem, const BasicSinglePointSolution<Scalar>& s,
+                                       const BasicSinglePointVector<Scalar>& x, const Constellation* of) {
   StaticVector<double, kMaxCodeRows> r_m;
   for (const CodeRow& r : s.rows)
     if (r.fate == CodeFate::used && (!of || r.satellite.constellation == *of)) static_cast<void>(r_m.push_back(problem.residual_m(x, r)));
@@ -128,9 +138,10 @@ inline void report(const SinglePointProblem& problem, GpsTime tag, const SingleP
 }
 
 /// Clocks for a start at the prior's position: the common offset from all rows, and each clock that the prior does not know from its own.
-inline void start_clocks(const SinglePointProblem& problem, const SinglePointSolution& s, const SinglePointPrior& prior,
-                         SinglePointVector& x) {
-  x.segment<kSinglePointClocks>(3).array() += median_residual_m(problem, s, x, nullptr);
+template <class Scalar>
+void start_clocks(const BasicSinglePointProblem<Scalar>& problem, const BasicSinglePointSolution<Scalar>& s,
+                  const BasicSinglePointPrior<Scalar>& prior, BasicSinglePointVector<Scalar>& x) {
+  x.template segment<kSinglePointClocks>(3).array() += median_residual_m(problem, s, x, nullptr);
   for (std::size_t c = 0; c < kConstellations; ++c) {
     const Constellation of = static_cast<Constellation>(c);
     const int i = 3 + static_cast<int>(c);
@@ -139,14 +150,16 @@ inline void start_clocks(const SinglePointProblem& problem, const SinglePointSol
 }
 
 /// A start from codes alone: least squares from options.start_e_m, then the robust descent without atmosphere.
-[[nodiscard]] inline Status start_from_codes(SinglePointProblem& problem, const SinglePointOptions& options, SinglePointVector& x) {
+template <class Scalar>
+[[nodiscard]] Status start_from_codes(BasicSinglePointProblem<Scalar>& problem, const SinglePointOptions& options,
+                                      BasicSinglePointVector<Scalar>& x) {
   problem.forget_place();
   x.setZero();
-  x.head<3>() = options.start_e_m;
+  x.template head<3>() = options.start_e_m;
   if (!problem.converge_plainly(x))
     return failure(StatusCode::under_determined, "single point: the satellites do not determine a position");
   static_cast<void>(best_descent(problem, x));
-  const double radius_m = x.head<3>().norm();
+  const double radius_m = x.template head<3>().norm();
   if (!(radius_m > 5e6 && radius_m < 5e7))
     return failure(StatusCode::rejected, "single point: the solution is not near the Earth", -1, -1, radius_m);
   return ok_status();
@@ -157,11 +170,11 @@ inline void start_clocks(const SinglePointProblem& problem, const SinglePointSol
 /// Position of one receiver at one epoch. Without prior at least four usable codes are needed, with a prior one.
 /// Errors: invalid_argument (an option or the prior out of its domain), no_data (no usable code), too_few (not enough codes, or not
 /// enough that agree: `index` there, `detail` needed), under_determined (geometry), rejected (not near the Earth). A solution that
-/// fails its own chi-square test is returned with consistent = false and a covariance scaled up by the test.
-template <std::size_t N>
-[[nodiscard]] Result<SinglePointSolution> solve_single_point(const ObservationEpoch& epoch, const EphemerisStore<N>& store,
-                                                             const SinglePointOptions& options = {},
-                                                             const std::optional<SinglePointPrior>& prior = std::nullopt) {
+/// fails its own chi-square test is returned with consistent = false and a covariance scaled up by the test. Scalar: double or wider.
+template <class Scalar = double, std::size_t N>
+[[nodiscard]] Result<BasicSinglePointSolution<Scalar>> solve_single_point(
+    const ObservationEpoch& epoch, const EphemerisStore<N>& store, const SinglePointOptions& options = {},
+    const std::type_identity_t<std::optional<BasicSinglePointPrior<Scalar>>>& prior = std::nullopt) {
   if (options.codes_per_satellite < 1 || options.codes_per_satellite > kCodesPerSatellite)
     return failure(StatusCode::invalid_argument, "single point: codes_per_satellite outside its range");
   if (!(options.outlier_sigmas > 0 && options.data_information_scale > 0 && options.late_factor >= 1 && options.cn0_decade_db > 0))
@@ -173,23 +186,24 @@ template <std::size_t N>
   if (!(options.other_carrier_sigma_m >= 0.01 && options.other_carrier_sigma_m <= 1e6))
     return failure(StatusCode::invalid_argument, "single point: other_carrier_sigma_m outside [0.01, 1e6] m", -1, -1,
                    options.other_carrier_sigma_m);
-  if (!options.start_e_m.allFinite() || (prior && !(prior->mean.allFinite() && prior->information.allFinite())))
+  const math::Vector3<Scalar> start_e_m = options.start_e_m;
+  if (!start_e_m.allFinite() || (prior && !(prior->mean.allFinite() && prior->information.allFinite())))
     return failure(StatusCode::invalid_argument, "single point: start or prior is not finite");
 
-  SinglePointSolution out;
-  detail::SinglePointProblem problem(options, prior, out);
+  BasicSinglePointSolution<Scalar> out;
+  detail::BasicSinglePointProblem<Scalar> problem(options, prior, out);
   problem.collect(epoch, store);
   if (problem.candidates() == 0) return failure(StatusCode::no_data, "single point: no satellite with a usable code and an ephemeris");
   if (problem.redundancy() < 0) return failure(StatusCode::too_few, "single point: fewer codes than unknowns", problem.candidates(), 4);
 
-  SinglePointVector x;
+  BasicSinglePointVector<Scalar> x;
   if (prior) {
     x = prior->mean;
-    problem.place(x.head<3>());
+    problem.place(x.template head<3>());
     detail::start_clocks(problem, out, *prior, x);
   } else {
     if (const Status s = detail::start_from_codes(problem, options, x); !s) return s;
-    problem.place(x.head<3>());
+    problem.place(x.template head<3>());
   }
   if (problem.redundancy() < 0)
     return failure(StatusCode::too_few, "single point: fewer codes above the elevation mask than unknowns", problem.candidates(), 4);

@@ -47,10 +47,16 @@ namespace detail {
   return "1256";
 }
 
-/// The estimation of one epoch: rows, prior and the few linear-algebra steps that every stage repeats.
-class SinglePointProblem {
+/// The estimation of one epoch: rows, prior and the few linear-algebra steps that every stage repeats. Scalar: double or wider.
+template <class Scalar>
+class BasicSinglePointProblem {
  public:
-  SinglePointProblem(const SinglePointOptions& options, const std::optional<SinglePointPrior>& prior, SinglePointSolution& out)
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Vector = BasicSinglePointVector<Scalar>;
+  using Matrix = BasicSinglePointMatrix<Scalar>;
+  using Prior = BasicSinglePointPrior<Scalar>;
+
+  BasicSinglePointProblem(const SinglePointOptions& options, const std::optional<Prior>& prior, BasicSinglePointSolution<Scalar>& out)
       : options_(options), prior_(prior), rows_(out.rows) {}
 
   template <std::size_t N>
@@ -65,7 +71,7 @@ class SinglePointProblem {
   }
 
   /// Elevation, delays, sigmas and the mask at a position; rows hidden by the mask come back when the position changes.
-  void place(const Eigen::Vector3d& p_e_m) {
+  void place(const Vector3& p_e_m) {
     const geodesy::Geodetic g = geodesy::geodetic_from_ecef(p_e_m);
     for (CodeRow& r : rows_) {
       if (r.fate != CodeFate::used && r.fate != CodeFate::low && r.fate != CodeFate::outlier) continue;
@@ -88,26 +94,26 @@ class SinglePointProblem {
   }
 
   /// Least squares without weights from a rough start. False when the geometry does not determine the unknowns.
-  [[nodiscard]] bool converge_plainly(SinglePointVector& x) const {
+  [[nodiscard]] bool converge_plainly(Vector& x) const {
     for (int i = 0; i < 12; ++i) {
-      SinglePointVector step;
+      Vector step;
       if (!solve(
               x, [](const CodeRow&) { return 1.0; }, step))
         return false;
       x += step;
-      if (!x.allFinite() || x.head<3>().norm() > 1e9) return false;
-      if (step.head<3>().norm() < 1e-3) return true;
+      if (!x.allFinite() || x.template head<3>().norm() > 1e9) return false;
+      if (step.template head<3>().norm() < 1e-3) return true;
     }
     return true;
   }
 
   /// Graduated robust descent. While the scale is coarse, the constellation `without` (kConstellations: none) is left out and late codes
   /// count `lateness` times on top of the options' factor. Returns the robust cost.
-  [[nodiscard]] double descend(SinglePointVector& x, std::size_t without, double lateness) const {
+  [[nodiscard]] double descend(Vector& x, std::size_t without, double lateness) const {
     double c = std::max(largest_residual(x), kFinalScale);
     for (int settled = 0, i = 0; settled < 5 && i < 60; ++i) {
       const robust::GemanMcClure<double> loss{c};
-      SinglePointVector step;
+      Vector step;
       const bool coarse = c > kFinalScale;
       const auto weight = [&](const CodeRow& r) {
         if (coarse && static_cast<std::size_t>(r.satellite.constellation) == without) return 1e-6;
@@ -122,7 +128,7 @@ class SinglePointProblem {
     return robust_cost(x);
   }
 
-  [[nodiscard]] double robust_cost(const SinglePointVector& x) const {
+  [[nodiscard]] double robust_cost(const Vector& x) const {
     const robust::GemanMcClure<double> loss{kFinalScale};
     double cost = 0;
     for (const CodeRow& r : rows_) {
@@ -134,9 +140,9 @@ class SinglePointProblem {
   }
 
   /// Solves with the used rows at full weight; x is improved, `covariance` filled.
-  [[nodiscard]] bool refine(SinglePointVector& x, SinglePointMatrix* covariance = nullptr) const {
+  [[nodiscard]] bool refine(Vector& x, Matrix* covariance = nullptr) const {
     for (int i = 0; i < 3; ++i) {
-      SinglePointVector step;
+      Vector step;
       if (!solve(
               x, [](const CodeRow&) { return 1.0; }, step, covariance))
         return false;
@@ -146,19 +152,19 @@ class SinglePointProblem {
   }
 
   /// Marks what lies beyond `outlier_sigmas` of x as outlier, and takes back what does not.
-  void select(const SinglePointVector& x) {
+  void select(const Vector& x) {
     for (CodeRow& r : rows_)
       if (r.fate == CodeFate::used || r.fate == CodeFate::outlier)
         r.fate = suspicion(x, r) <= options_.outlier_sigmas ? CodeFate::used : CodeFate::outlier;
   }
 
   /// The used row with the largest residual over its own standard deviation given the others; nullptr when no row is checked by others.
-  [[nodiscard]] CodeRow* least_plausible(const SinglePointVector& x, const SinglePointMatrix& covariance) {
+  [[nodiscard]] CodeRow* least_plausible(const Vector& x, const Matrix& covariance) {
     CodeRow* worst = nullptr;
     double largest = 0;
     for (CodeRow& r : rows_) {
       if (r.fate != CodeFate::used) continue;
-      const SinglePointVector a = direction(x, r);
+      const Vector a = direction(x, r);
       const double own_share = options_.data_information_scale * a.dot(covariance.lazyProduct(a)) / (r.sigma_m * r.sigma_m);
       if (own_share > 0.999) continue;
       const double z = std::abs(residual_m(x, r)) / (r.sigma_m * std::sqrt(1 - own_share));
@@ -167,7 +173,7 @@ class SinglePointProblem {
     return worst;
   }
 
-  [[nodiscard]] double chi_square(const SinglePointVector& x) const {
+  [[nodiscard]] double chi_square(const Vector& x) const {
     double sum = 2 * prior_cost(x);
     for (const CodeRow& r : rows_) {
       if (r.fate != CodeFate::used) continue;
@@ -180,13 +186,13 @@ class SinglePointProblem {
   /// Rows used minus the unknowns that nothing else determines: the common clock, and the position when there is no prior.
   [[nodiscard]] int redundancy() const { return candidates() - (prior_ ? 1 : 4); }
 
-  [[nodiscard]] double residual_m(const SinglePointVector& x, const CodeRow& r) const {
-    return r.corrected_m - r.atmosphere_m - range_m(x.head<3>(), r.transmission.state.position_e_m) - x[clock_index(r)] -
+  [[nodiscard]] double residual_m(const Vector& x, const CodeRow& r) const {
+    return r.corrected_m - r.atmosphere_m - range_m(x.template head<3>(), r.transmission.state.position_e_m) - x[clock_index(r)] -
            (is_other_carrier(r) ? x[3 + kSinglePointClocks] : 0.0);
   }
 
   /// Residual in sigmas, late ones counted `late_factor` times.
-  [[nodiscard]] double suspicion(const SinglePointVector& x, const CodeRow& r) const {
+  [[nodiscard]] double suspicion(const Vector& x, const CodeRow& r) const {
     const double z = residual_m(x, r) / r.sigma_m;
     return z > 0 ? options_.late_factor * z : -z;
   }
@@ -199,11 +205,11 @@ class SinglePointProblem {
   }
 
   /// d (modelled code) / d x.
-  [[nodiscard]] static SinglePointVector direction(const SinglePointVector& x, const CodeRow& r) {
-    SinglePointVector a = SinglePointVector::Zero();
-    Eigen::Vector3d d_range_d_p;
-    static_cast<void>(range_m(x.head<3>(), r.transmission.state.position_e_m, &d_range_d_p));
-    a.head<3>() = d_range_d_p;
+  [[nodiscard]] static Vector direction(const Vector& x, const CodeRow& r) {
+    Vector a = Vector::Zero();
+    Vector3 d_range_d_p;
+    static_cast<void>(range_m(x.template head<3>(), r.transmission.state.position_e_m, &d_range_d_p));
+    a.template head<3>() = d_range_d_p;
     a[clock_index(r)] = 1;
     if (is_other_carrier(r)) a[3 + kSinglePointClocks] = 1;
     return a;
@@ -243,13 +249,13 @@ class SinglePointProblem {
     if (taken == 0) static_cast<void>(rows_.push_back(row));
   }
 
-  [[nodiscard]] double prior_cost(const SinglePointVector& x) const {
+  [[nodiscard]] double prior_cost(const Vector& x) const {
     if (!prior_) return 0;
-    const SinglePointVector d = x - prior_->mean;
+    const Vector d = x - prior_->mean;
     return 0.5 * d.dot(prior_->information.lazyProduct(d));
   }
 
-  [[nodiscard]] double largest_residual(const SinglePointVector& x) const {
+  [[nodiscard]] double largest_residual(const Vector& x) const {
     double largest = 0;
     for (const CodeRow& r : rows_)
       if (r.fate == CodeFate::used) largest = std::max(largest, suspicion(x, r));
@@ -257,16 +263,16 @@ class SinglePointProblem {
   }
 
   /// Information of the receiver's delays; it also ties the clock of a constellation without rows to the others.
-  void add_receiver_delays(const SinglePointVector& x, SinglePointMatrix& N, SinglePointVector& g) const {
+  void add_receiver_delays(const Vector& x, Matrix& N, Vector& g) const {
     constexpr int n = kSinglePointClocks;
-    Eigen::Matrix<double, n, 1> d;
+    Eigen::Matrix<Scalar, n, 1> d;
     for (int c = 0; c < n; ++c)
       d[c] = 1.0 / (options_.clock_difference_sigma_m[static_cast<std::size_t>(c)] *
                     options_.clock_difference_sigma_m[static_cast<std::size_t>(c)]);
-    Eigen::Matrix<double, n, n> form = -d * d.transpose() / d.sum();
+    Eigen::Matrix<Scalar, n, n> form = -d * d.transpose() / d.sum();
     form.diagonal() += d;
-    N.block<n, n>(3, 3) += form;
-    g.segment<n>(3) -= form * x.segment<n>(3);
+    N.template block<n, n>(3, 3) += form;
+    g.template segment<n>(3) -= form * x.template segment<n>(3);
     const double other = 1.0 / (options_.other_carrier_sigma_m * options_.other_carrier_sigma_m);
     N(3 + n, 3 + n) += other;
     g[3 + n] -= other * x[3 + n];
@@ -274,13 +280,12 @@ class SinglePointProblem {
 
   /// One weighted Gauss-Newton step; weights multiply the information of the rows. False when the system is not positive definite.
   template <class Weight>
-  [[nodiscard]] bool solve(const SinglePointVector& x, Weight weight, SinglePointVector& step,
-                           SinglePointMatrix* covariance = nullptr) const {
-    SinglePointMatrix N = SinglePointMatrix::Zero();
-    SinglePointVector g = SinglePointVector::Zero();
+  [[nodiscard]] bool solve(const Vector& x, Weight weight, Vector& step, Matrix* covariance = nullptr) const {
+    Matrix N = Matrix::Zero();
+    Vector g = Vector::Zero();
     for (const CodeRow& r : rows_) {
       if (r.fate != CodeFate::used) continue;
-      const SinglePointVector a = direction(x, r);
+      const Vector a = direction(x, r);
       const double w = options_.data_information_scale * weight(r) / (r.sigma_m * r.sigma_m);
       for (int i = 0; i < kSinglePointUnknowns; ++i)
         for (int j = 0; j <= i; ++j) N(i, j) += w * a[i] * a[j];
@@ -291,7 +296,7 @@ class SinglePointProblem {
       g += prior_->information.lazyProduct(prior_->mean - x);
     }
     if (!prior_ || !prior_->knows_receiver_delays) add_receiver_delays(x, N, g);
-    const math::SmallCholesky<kSinglePointUnknowns> factor(N);
+    const math::SmallCholesky<kSinglePointUnknowns, Scalar> factor(N);
     if (!factor.ok()) return false;
     step = factor.solve(g);
     if (covariance) *covariance = factor.inverse();
@@ -299,10 +304,12 @@ class SinglePointProblem {
   }
 
   const SinglePointOptions& options_;
-  const std::optional<SinglePointPrior>& prior_;
+  const std::optional<Prior>& prior_;
   StaticVector<CodeRow, kMaxCodeRows>& rows_;
   KlobucharCoefficients ionosphere_{};
 };
+
+using SinglePointProblem = BasicSinglePointProblem<double>;
 
 }  // namespace detail
 }  // namespace searvins::gnss

@@ -20,6 +20,7 @@
 #include <searvins/gnss/satellite.hpp>
 #include <searvins/gnss/signal.hpp>
 #include <searvins/gnss/weighting.hpp>
+#include <searvins/math/deferred.hpp>
 
 namespace searvins::gnss {
 
@@ -30,9 +31,13 @@ inline constexpr std::size_t kMaxCodeRows = kCodesPerSatellite * kMaxSatellitesP
 
 /// Position (0..2), clocks of the constellations (3..6) and delay of the other carriers (7), all metres.
 /// Not aligned for vector registers: the layout of a solution does not follow machine flags.
-using SinglePointVector = Eigen::Matrix<double, kSinglePointUnknowns, 1, Eigen::DontAlign>;
+template <class Scalar>
+using BasicSinglePointVector = Eigen::Matrix<Scalar, kSinglePointUnknowns, 1, Eigen::DontAlign>;
+using SinglePointVector = BasicSinglePointVector<double>;  ///< of doubles
 /// Covariance of a SinglePointVector, m^2.
-using SinglePointMatrix = Eigen::Matrix<double, kSinglePointUnknowns, kSinglePointUnknowns, Eigen::DontAlign>;
+template <class Scalar>
+using BasicSinglePointMatrix = Eigen::Matrix<Scalar, kSinglePointUnknowns, kSinglePointUnknowns, Eigen::DontAlign>;
+using SinglePointMatrix = BasicSinglePointMatrix<double>;  ///< of doubles
 
 /// What became of a satellite's code.
 enum class CodeFate : std::uint8_t {
@@ -66,19 +71,26 @@ struct SinglePointOptions {
 };
 
 /// A Gaussian prediction of position and clocks. Directions without information have zero rows: information need not be invertible.
-struct SinglePointPrior {
-  SinglePointVector mean{SinglePointVector::Zero()};
-  SinglePointMatrix information{SinglePointMatrix::Zero()};
+/// Scalar: double or wider, as in everything here.
+template <class Scalar>
+struct BasicSinglePointPrior {
+  using Vector = BasicSinglePointVector<Scalar>;
+  using Matrix = BasicSinglePointMatrix<Scalar>;
+
+  Vector mean{Vector::Zero()};
+  Matrix information{Matrix::Zero()};
   bool knows_receiver_delays{false};  ///< true: the options' clock differences and carrier delay are not applied on top
 
   /// Position known to `sigma_m` in every axis, clocks unknown.
-  [[nodiscard]] static SinglePointPrior at(const Eigen::Vector3d& position_e_m, double sigma_m) {
-    SinglePointPrior p;
-    p.mean.head<3>() = position_e_m;
-    p.information.diagonal().head<3>().setConstant(1.0 / (sigma_m * sigma_m));
+  [[nodiscard]] static BasicSinglePointPrior at(const math::Vector3<Scalar>& position_e_m, double sigma_m) {
+    BasicSinglePointPrior p;
+    p.mean.template head<3>() = position_e_m;
+    p.information.diagonal().template head<3>().setConstant(1.0 / (sigma_m * sigma_m));
     return p;
   }
 };
+
+using SinglePointPrior = BasicSinglePointPrior<double>;  ///< of doubles
 
 /// One code in the solution, or the reason why it is not.
 struct CodeRow {
@@ -95,12 +107,17 @@ struct CodeRow {
 };
 
 /// Result of one epoch.
-struct SinglePointSolution {
+template <class Scalar>
+struct BasicSinglePointSolution {
+  using Vector3 = math::Vector3<Scalar>;
+  using Vector = BasicSinglePointVector<Scalar>;
+  using Matrix = BasicSinglePointMatrix<Scalar>;
+
   GpsTime time{};  ///< of the position: tag minus the mean clock offset of the used rows
-  Eigen::Vector3d position_e_m{Eigen::Vector3d::Zero()};
-  SinglePointVector state{SinglePointVector::Zero()};       ///< position and clocks, metres
-  SinglePointMatrix covariance{SinglePointMatrix::Zero()};  ///< of state; scaled up by the chi-square test when that fails
-  std::array<double, kConstellations> clock_s{};            ///< receiver tag minus system time
+  Vector3 position_e_m{Vector3::Zero()};
+  Vector state{Vector::Zero()};                   ///< position and clocks, metres
+  Matrix covariance{Matrix::Zero()};              ///< of state; scaled up by the chi-square test when that fails
+  std::array<double, kConstellations> clock_s{};  ///< receiver tag minus system time
   std::array<bool, kConstellations> constellation_used{};
   StaticVector<CodeRow, kMaxCodeRows> rows{};  ///< one for every code tried, and one for a satellite without code
   int used{0}, excluded{0};                    ///< rows in the solution; rows found to be outliers
@@ -109,7 +126,9 @@ struct SinglePointSolution {
   int redundancy{0};
   bool consistent{false};  ///< the chi-square test was passed, with redundancy
 
-  [[nodiscard]] Eigen::Matrix3d position_covariance_m2() const { return covariance.topLeftCorner<3, 3>(); }
+  [[nodiscard]] math::Matrix3<Scalar> position_covariance_m2() const { return covariance.template topLeftCorner<3, 3>(); }
 };
+
+using SinglePointSolution = BasicSinglePointSolution<double>;  ///< of doubles
 
 }  // namespace searvins::gnss

@@ -34,6 +34,7 @@
 #include <searvins/gnss/ephemeris.hpp>
 #include <searvins/gnss/observation.hpp>
 #include <searvins/gnss/single_point.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/math/quantiles.hpp>
 #include <searvins/math/small_cholesky.hpp>
 
@@ -65,46 +66,55 @@ enum class TrackStatus : std::uint8_t {
   restarted,  ///< contradicted several times: from codes alone
 };
 
-/// One epoch of the filter.
-struct TrackedPosition {
+/// One epoch of the filter. Scalar: double or wider.
+template <class Scalar>
+struct BasicTrackedPosition {
+  using Vector3 = math::Vector3<Scalar>;
+  using Matrix3 = math::Matrix3<Scalar>;
+
   GpsTime time{};
   TrackStatus status{TrackStatus::started};
-  Eigen::Vector3d position_e_m{Eigen::Vector3d::Zero()};
-  Eigen::Vector3d velocity_e_mps{Eigen::Vector3d::Zero()};
-  Eigen::Matrix3d position_covariance_m2{Eigen::Matrix3d::Zero()};
-  Eigen::Matrix3d velocity_covariance_m2ps2{Eigen::Matrix3d::Zero()};
+  Vector3 position_e_m{Vector3::Zero()};
+  Vector3 velocity_e_mps{Vector3::Zero()};
+  Matrix3 position_covariance_m2{Matrix3::Zero()};
+  Matrix3 velocity_covariance_m2ps2{Matrix3::Zero()};
   bool doppler_used{false};
-  int doubts{0};                       ///< consecutive contradictions so far
-  SinglePointSolution single_point{};  ///< rows, residuals and clocks of this epoch; empty when coasted
+  int doubts{0};                                    ///< consecutive contradictions so far
+  BasicSinglePointSolution<Scalar> single_point{};  ///< rows, residuals and clocks of this epoch; empty when coasted
 };
 
-/// The filter. Feed epochs in time order.
-class SinglePointTracker {
+using TrackedPosition = BasicTrackedPosition<double>;  ///< of doubles
+
+/// The filter. Feed epochs in time order. Scalar: double or wider.
+template <class Scalar>
+class BasicSinglePointTracker {
  public:
-  explicit SinglePointTracker(const TrackerOptions& options = {}) : options_(options) {}
+  using Position = BasicTrackedPosition<Scalar>;
+
+  explicit BasicSinglePointTracker(const TrackerOptions& options = {}) : options_(options) {}
 
   /// Forgets everything.
-  void reset() { *this = SinglePointTracker(options_); }
+  void reset() { *this = BasicSinglePointTracker(options_); }
   [[nodiscard]] bool running() const { return running_; }
 
   /// Takes one epoch. Errors: out_of_order (tag not after the last one; nothing is changed); those of solve_single_point while there
   /// is nothing to track; stale (no usable code for max_gap_s: the filter has forgotten its state).
   template <std::size_t N>
-  [[nodiscard]] Result<TrackedPosition> update(const ObservationEpoch& epoch, const EphemerisStore<N>& store) {
+  [[nodiscard]] Result<Position> update(const ObservationEpoch& epoch, const EphemerisStore<N>& store) {
     if (!running_) return start(epoch, store, TrackStatus::started);
     const double dt_s = seconds_between(tag_, epoch.tag);
     if (!(dt_s > 0)) return failure(StatusCode::out_of_order, "tracker: epoch not after the last one", -1, -1, dt_s);
     if (dt_s > options_.max_gap_s) return start(epoch, store, TrackStatus::started);
     predict(dt_s);
     tag_ = epoch.tag;
-    TrackedPosition out;
+    Position out;
     out.doppler_used = absorb_doppler(epoch, store);
 
     SinglePointOptions options = options_.single_point;
     options.data_information_scale *= std::min(1.0, dt_s / options_.correlation_s);
-    const std::optional<SinglePointPrior> prior = position_prior();
+    const std::optional<Prior> prior = position_prior();
     if (!prior) return start(epoch, store, TrackStatus::restarted);
-    const Result<SinglePointSolution> with_prior = solve_single_point(epoch, store, options, prior);
+    const Result<Solution> with_prior = solve_single_point<Scalar>(epoch, store, options, prior);
     const bool contradicted = contradicts(epoch, store, with_prior);
     doubts_ = contradicted ? doubts_ + 1 : 0;
     if (doubts_ >= options_.doubts_until_restart) return start(epoch, store, TrackStatus::restarted);
@@ -119,22 +129,27 @@ class SinglePointTracker {
 
  private:
   static constexpr int kSize = 3 + kSinglePointUnknowns;
-  using State = Eigen::Matrix<double, kSize, 1>;
-  using Covariance = Eigen::Matrix<double, kSize, kSize>;
+  using State = Eigen::Matrix<Scalar, kSize, 1>;
+  using Covariance = Eigen::Matrix<Scalar, kSize, kSize>;
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+  using Codes = BasicSinglePointVector<Scalar>;  // the part (p, b) of the state
+  using Prior = BasicSinglePointPrior<Scalar>;
+  using Solution = BasicSinglePointSolution<Scalar>;
 
   template <std::size_t N>
-  [[nodiscard]] Result<TrackedPosition> start(const ObservationEpoch& epoch, const EphemerisStore<N>& store, TrackStatus status) {
+  [[nodiscard]] Result<Position> start(const ObservationEpoch& epoch, const EphemerisStore<N>& store, TrackStatus status) {
     running_ = false;
-    const Result<SinglePointSolution> s = solve_single_point(epoch, store, options_.single_point);
+    const Result<Solution> s = solve_single_point<Scalar>(epoch, store, options_.single_point);
     if (!s) return s.status();
     x_.setZero();
     P_.setZero();
-    x_.tail<kSinglePointUnknowns>() = s->state;
-    P_.bottomRightCorner<kSinglePointUnknowns, kSinglePointUnknowns>() = s->covariance;
-    P_.diagonal().segment<3>(3).array() += options_.start_sigma_m * options_.start_sigma_m;
-    P_.diagonal().head<3>().setConstant(kStartSpeedMps * kStartSpeedMps);
+    x_.template tail<kSinglePointUnknowns>() = s->state;
+    P_.template bottomRightCorner<kSinglePointUnknowns, kSinglePointUnknowns>() = s->covariance;
+    P_.diagonal().template segment<3>(3).array() += options_.start_sigma_m * options_.start_sigma_m;
+    P_.diagonal().template head<3>().setConstant(kStartSpeedMps * kStartSpeedMps);
     tag_ = epoch.tag, running_ = true, doubts_ = 0, coasting_s_ = 0;
-    TrackedPosition out;
+    Position out;
     out.status = status;
     out.doppler_used = absorb_doppler(epoch, store);
     out.single_point = *s;
@@ -143,102 +158,102 @@ class SinglePointTracker {
   }
 
   void predict(double dt_s) {
-    const Eigen::Matrix3d R_ew = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(x_.segment<3>(3)));
+    const Matrix3 R_ew = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(x_.template segment<3>(3)));
     const double h = options_.horizontal_acceleration_mps2, v = options_.vertical_acceleration_mps2;
-    const Eigen::Matrix3d acceleration = R_ew * Eigen::Vector3d(h * h, h * h, v * v).asDiagonal() * R_ew.transpose();
-    x_.segment<3>(3) += dt_s * x_.head<3>();
+    const Matrix3 acceleration = R_ew * Vector3(h * h, h * h, v * v).asDiagonal() * R_ew.transpose();
+    x_.template segment<3>(3) += dt_s * x_.template head<3>();
     // P <- F P F' with F = I except p <- p + dt v, written as a row and a column operation.
-    P_.middleRows<3>(3) += dt_s * P_.topRows<3>();
-    P_.middleCols<3>(3) += dt_s * P_.leftCols<3>();
-    P_.topLeftCorner<3, 3>() += dt_s * dt_s * acceleration;
-    P_.block<3, 3>(0, 3) += 0.5 * dt_s * dt_s * dt_s * acceleration;
-    P_.block<3, 3>(3, 0) += 0.5 * dt_s * dt_s * dt_s * acceleration;
-    P_.block<3, 3>(3, 3) += 0.25 * dt_s * dt_s * dt_s * dt_s * acceleration;
-    P_.diagonal().segment<3>(3).array() += options_.position_walk_m * options_.position_walk_m * dt_s;
-    P_.diagonal().tail<kSinglePointClocks + 1>().array() += options_.receiver_delay_walk_m * options_.receiver_delay_walk_m * dt_s;
+    P_.template middleRows<3>(3) += dt_s * P_.template topRows<3>();
+    P_.template middleCols<3>(3) += dt_s * P_.template leftCols<3>();
+    P_.template topLeftCorner<3, 3>() += dt_s * dt_s * acceleration;
+    P_.template block<3, 3>(0, 3) += 0.5 * dt_s * dt_s * dt_s * acceleration;
+    P_.template block<3, 3>(3, 0) += 0.5 * dt_s * dt_s * dt_s * acceleration;
+    P_.template block<3, 3>(3, 3) += 0.25 * dt_s * dt_s * dt_s * dt_s * acceleration;
+    P_.diagonal().template segment<3>(3).array() += options_.position_walk_m * options_.position_walk_m * dt_s;
+    P_.diagonal().template tail<kSinglePointClocks + 1>().array() += options_.receiver_delay_walk_m * options_.receiver_delay_walk_m * dt_s;
   }
 
   template <std::size_t N>
   [[nodiscard]] bool absorb_doppler(const ObservationEpoch& epoch, const EphemerisStore<N>& store) {
-    const math::SmallCholesky<3> factor(P_.topLeftCorner<3, 3>());
+    const math::SmallCholesky<3, Scalar> factor(P_.template topLeftCorner<3, 3>());
     if (!factor.ok()) return false;
-    const Eigen::Matrix3d information = factor.inverse();
-    const Result<DopplerVelocity> d =
-        solve_doppler_velocity(epoch, store, x_.segment<3>(3), options_.doppler, VelocityPrior{x_.head<3>(), information});
+    const Matrix3 information = factor.inverse();
+    const Result<BasicDopplerVelocity<Scalar>> d = solve_doppler_velocity<Scalar>(epoch, store, x_.template segment<3>(3), options_.doppler,
+                                                                                  VelocityPrior{x_.template head<3>(), information});
     if (!d || !d->consistent) return false;
-    Eigen::Matrix3d after = d->velocity_covariance_m2ps2();
+    Matrix3 after = d->velocity_covariance_m2ps2();
     after.diagonal().array() += options_.doppler_floor_mps * options_.doppler_floor_mps;
-    const Eigen::Matrix<double, kSize, 3> gain = P_.leftCols<3>().lazyProduct(information);
-    const Eigen::Matrix3d shrink = P_.topLeftCorner<3, 3>() - after;
-    const Eigen::Vector3d change_mps = d->velocity_e_mps - x_.head<3>();
+    const Eigen::Matrix<Scalar, kSize, 3> gain = P_.template leftCols<3>().lazyProduct(information);
+    const Matrix3 shrink = P_.template topLeftCorner<3, 3>() - after;
+    const Vector3 change_mps = d->velocity_e_mps - x_.template head<3>();
     x_ += gain.lazyProduct(change_mps);
-    const Eigen::Matrix<double, kSize, 3> shrunk = gain.lazyProduct(shrink);
+    const Eigen::Matrix<Scalar, kSize, 3> shrunk = gain.lazyProduct(shrink);
     P_ -= shrunk.lazyProduct(gain.transpose());
     symmetrise();
     return true;
   }
 
   /// (p, b) as predicted, the common clock unknown. Empty when the covariance has lost its definiteness.
-  [[nodiscard]] std::optional<SinglePointPrior> position_prior() const {
-    SinglePointPrior prior;
-    const math::SmallCholesky<kSinglePointUnknowns> factor(P_.bottomRightCorner<kSinglePointUnknowns, kSinglePointUnknowns>());
+  [[nodiscard]] std::optional<Prior> position_prior() const {
+    Prior prior;
+    const math::SmallCholesky<kSinglePointUnknowns, Scalar> factor(
+        P_.template bottomRightCorner<kSinglePointUnknowns, kSinglePointUnknowns>());
     if (!factor.ok()) return std::nullopt;
-    SinglePointVector common = SinglePointVector::Zero();
-    common.segment<kSinglePointClocks>(3).setOnes();
-    const SinglePointVector y = factor.solve(common);
-    prior.mean = x_.tail<kSinglePointUnknowns>();
+    Codes common = Codes::Zero();
+    common.template segment<kSinglePointClocks>(3).setOnes();
+    const Codes y = factor.solve(common);
+    prior.mean = x_.template tail<kSinglePointUnknowns>();
     prior.information = factor.inverse();
     prior.information -= (y / common.dot(y)).lazyProduct(y.transpose());
     prior.knows_receiver_delays = true;
     return prior;
   }
 
-  void absorb_position(const SinglePointPrior& prior, const SinglePointSolution& s) {
-    const Eigen::Matrix<double, 3, kSinglePointUnknowns> cross = P_.topRightCorner<3, kSinglePointUnknowns>();
-    const Eigen::Matrix<double, 3, kSinglePointUnknowns> gain = cross.lazyProduct(prior.information);
-    x_.head<3>() += gain.lazyProduct(s.state - prior.mean);
-    x_.tail<kSinglePointUnknowns>() = s.state;
-    const Eigen::Matrix<double, 3, kSinglePointUnknowns> carried = gain.lazyProduct(s.covariance);
-    P_.topLeftCorner<3, 3>() += (carried - cross).lazyProduct(gain.transpose());
-    P_.topRightCorner<3, kSinglePointUnknowns>() = carried;
-    P_.bottomLeftCorner<kSinglePointUnknowns, 3>() = P_.topRightCorner<3, kSinglePointUnknowns>().transpose();
-    P_.bottomRightCorner<kSinglePointUnknowns, kSinglePointUnknowns>() = s.covariance;
+  void absorb_position(const Prior& prior, const Solution& s) {
+    const Eigen::Matrix<Scalar, 3, kSinglePointUnknowns> cross = P_.template topRightCorner<3, kSinglePointUnknowns>();
+    const Eigen::Matrix<Scalar, 3, kSinglePointUnknowns> gain = cross.lazyProduct(prior.information);
+    x_.template head<3>() += gain.lazyProduct(s.state - prior.mean);
+    x_.template tail<kSinglePointUnknowns>() = s.state;
+    const Eigen::Matrix<Scalar, 3, kSinglePointUnknowns> carried = gain.lazyProduct(s.covariance);
+    P_.template topLeftCorner<3, 3>() += (carried - cross).lazyProduct(gain.transpose());
+    P_.template topRightCorner<3, kSinglePointUnknowns>() = carried;
+    P_.template bottomLeftCorner<kSinglePointUnknowns, 3>() = P_.template topRightCorner<3, kSinglePointUnknowns>().transpose();
+    P_.template bottomRightCorner<kSinglePointUnknowns, kSinglePointUnknowns>() = s.covariance;
     symmetrise();
   }
 
   /// Do the codes alone, with clearly more satellites than agree with the prediction, put the receiver somewhere else?
   template <std::size_t N>
-  [[nodiscard]] bool contradicts(const ObservationEpoch& epoch, const EphemerisStore<N>& store,
-                                 const Result<SinglePointSolution>& with_prior) const {
+  [[nodiscard]] bool contradicts(const ObservationEpoch& epoch, const EphemerisStore<N>& store, const Result<Solution>& with_prior) const {
     const int agreeing = with_prior ? with_prior->used : 0;
     if (with_prior && with_prior->consistent && agreeing >= with_prior->excluded) return false;
-    const Result<SinglePointSolution> alone = solve_single_point(epoch, store, options_.single_point);
+    const Result<Solution> alone = solve_single_point<Scalar>(epoch, store, options_.single_point);
     if (!alone || !alone->consistent || 4 * alone->used <= 5 * agreeing) return false;
-    const Eigen::Matrix3d sum = alone->position_covariance_m2() + P_.block<3, 3>(3, 3);
-    const math::SmallCholesky<3> factor(sum);
+    const Matrix3 sum = alone->position_covariance_m2() + P_.template block<3, 3>(3, 3);
+    const math::SmallCholesky<3, Scalar> factor(sum);
     if (!factor.ok()) return false;
-    const Eigen::Vector3d apart_m = alone->position_e_m - x_.segment<3>(3);
+    const Vector3 apart_m = alone->position_e_m - x_.template segment<3>(3);
     const Result<double> bound = math::chi_square_threshold(options_.doubt_false_alarm, 3);
     return bound && apart_m.dot(factor.solve(apart_m)) > *bound;
   }
 
-  [[nodiscard]] Result<TrackedPosition> coast(const Status& why, double dt_s, bool contradicted, TrackedPosition& out) {
+  [[nodiscard]] Result<Position> coast(const Status& why, double dt_s, bool contradicted, Position& out) {
     coasting_s_ += dt_s;
     if (coasting_s_ > options_.max_gap_s) {
       running_ = false;
       return failure(StatusCode::stale, why.what, -1, -1, coasting_s_);
     }
     out.status = contradicted ? TrackStatus::doubtful : TrackStatus::coasted;
-    out.time = tag_.plus_seconds(-x_.segment<kSinglePointClocks>(6).mean() / kSpeedOfLightMps);
+    out.time = tag_.plus_seconds(-x_.template segment<kSinglePointClocks>(6).mean() / kSpeedOfLightMps);
     return filled(out);
   }
 
-  [[nodiscard]] TrackedPosition filled(TrackedPosition& out) const {
-    out.position_e_m = x_.segment<3>(3);
-    out.velocity_e_mps = x_.head<3>();
-    out.position_covariance_m2 = P_.block<3, 3>(3, 3);
+  [[nodiscard]] Position filled(Position& out) const {
+    out.position_e_m = x_.template segment<3>(3);
+    out.velocity_e_mps = x_.template head<3>();
+    out.position_covariance_m2 = P_.template block<3, 3>(3, 3);
     out.position_covariance_m2.diagonal().array() += options_.systematic_sigma_m * options_.systematic_sigma_m;
-    out.velocity_covariance_m2ps2 = P_.topLeftCorner<3, 3>();
+    out.velocity_covariance_m2ps2 = P_.template topLeftCorner<3, 3>();
     out.doubts = doubts_;
     return out;
   }
@@ -255,5 +270,7 @@ class SinglePointTracker {
   int doubts_{0};
   bool running_{false};
 };
+
+using SinglePointTracker = BasicSinglePointTracker<double>;  ///< in double precision
 
 }  // namespace searvins::gnss

@@ -12,13 +12,13 @@ namespace searvins::math {
 
 /// Factor of an N x N matrix. A pivot that is zero against its own diagonal element, or not finite, means ok() == false; there is
 /// nothing to solve with then.
-template <int N>
+template <int N, class Scalar = double>
 class SmallCholesky {
   static_assert(N > 0 && N <= 16, "for a handful of unknowns; larger systems belong to the elimination of the smoother");
 
  public:
-  using Matrix = Eigen::Matrix<double, N, N>;
-  using Vector = Eigen::Matrix<double, N, 1>;
+  using Matrix = Eigen::Matrix<Scalar, N, N>;
+  using Vector = Eigen::Matrix<Scalar, N, 1>;
 
   /// Factors A, of which the lower triangle is read.
   explicit SmallCholesky(const Matrix& A) : L_(A) {
@@ -40,7 +40,7 @@ class SmallCholesky {
     Matrix X;
     for (int j = 0; j < N; ++j) X.col(j) = solve(Vector::Unit(j));
     for (int j = 0; j < N; ++j)
-      for (int i = 0; i < j; ++i) X(i, j) = X(j, i) = 0.5 * (X(i, j) + X(j, i));
+      for (int i = 0; i < j; ++i) X(i, j) = X(j, i) = Scalar(0.5) * (X(i, j) + X(j, i));
     return X;
   }
 
