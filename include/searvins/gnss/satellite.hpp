@@ -150,12 +150,10 @@ template <class Scalar = double>
   o.node_rate = e.omega_dot - (geostationary ? 0.0 : k.earth_rate_radps);
   o.node = e.omega0 + o.node_rate * tk - k.earth_rate_radps * detail::toe_of_week_s(e);
 
-  math::Vector3<Scalar> p_e_m, v_e_mps;
+  SatelliteState s;
+  math::Vector3<Scalar>&p_e_m = s.position_e_m, &v_e_mps = s.velocity_e_mps;
   detail::to_node_frame(o, p_e_m, v_e_mps);
   if (geostationary) detail::geostationary_to_ecef(k.earth_rate_radps * tk, k.earth_rate_radps, p_e_m, v_e_mps);
-
-  SatelliteState s;
-  s.position_e_m = p_e_m, s.velocity_e_mps = v_e_mps;
 
   const double dt = seconds_between(e.toc, t), relativity = k.relativity_s_per_sqrt_m * e.eccentricity * e.sqrt_a;
   s.clock_s = e.af0 + dt * (e.af1 + dt * e.af2) + relativity * sE;
