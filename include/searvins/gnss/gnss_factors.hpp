@@ -28,6 +28,7 @@
 #include <searvins/geodesy/local_frame.hpp>
 #include <searvins/gnss/gnss_variables.hpp>
 #include <searvins/gnss/range.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/robust/formulation.hpp>
 #include <searvins/robust/shared_pivot.hpp>
 #include <searvins/smoother/factor.hpp>
@@ -58,7 +59,8 @@ struct DirectAntenna {
 /// See the file comment. MaxCandidates: largest batch without the pivot.
 template <class State, class FormulationType, Observable kObservable, int MaxCandidates, class Antenna = DirectAntenna>
 struct DifferenceFactor {
-  using Scalar = double;
+  using Scalar = math::Deferred<double, State>;
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
   static constexpr bool is_phase = kObservable == Observable::phase;
   static constexpr std::size_t kCandidates = static_cast<std::size_t>(MaxCandidates);
   static constexpr int max_rows = MaxCandidates + FormulationType::extra_rows;
@@ -75,7 +77,7 @@ struct DifferenceFactor {
   BatchMember pivot{};
   StaticVector<BatchMember, static_cast<std::size_t>(MaxCandidates)> candidates{};
   double wavelength_m{0};
-  robust::SharedPivot<double, MaxCandidates> covariance{};
+  robust::SharedPivot<Scalar, MaxCandidates> covariance{};
   FormulationType formulation{};
   /// What the batch counts for, after its robust weights: below 1 when the errors of consecutive epochs are alike and would add up to too much. The
   /// scale of what is an outlier stays that of one observation.
@@ -98,8 +100,8 @@ struct DifferenceFactor {
   template <class Values>
   void residuals(const Values& values, double* r, Eigen::Matrix<double, MaxCandidates, 3>* d_r_d_antenna = nullptr) const {
     const State& x = values(state);
-    Eigen::Vector3d u_o;
-    Eigen::Vector3d at;  // ECEF position, or velocity for Doppler
+    Vector3 u_o;
+    Vector3 at;  // ECEF position, or velocity for Doppler
     if constexpr (kObservable == Observable::doppler)
       at = frame.R_ew * antenna.velocity_w_mps(x);
     else
@@ -107,7 +109,7 @@ struct DifferenceFactor {
     const double h_o = model(at, pivot, u_o);
     for (int i = 0; i < size(); ++i) {
       const BatchMember& c = candidates[static_cast<std::size_t>(i)];
-      Eigen::Vector3d u;
+      Vector3 u;
       r[i] = (c.z - pivot.z) - (model(at, c, u) - h_o);
       if constexpr (is_phase) {
         const double n_o = pivot_ambiguity.valid() ? values(pivot_ambiguity).value : 0.0;
@@ -125,7 +127,7 @@ struct DifferenceFactor {
   }
 
   template <class Values>
-  void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
+  void linearise(const Values& values, double* e, smoother::JacobianRef<Scalar> J) const {
     double r[kCandidates], de_dn[kCandidates + 1];
     Eigen::Matrix<double, MaxCandidates, 3> d_antenna;
     residuals(values, r, &d_antenna);
@@ -181,7 +183,7 @@ struct DifferenceFactor {
     [[nodiscard]] int cols() const { return n; }
   };
 
-  [[nodiscard]] static double model(const Eigen::Vector3d& at_e, const BatchMember& s, Eigen::Vector3d& u) {
+  [[nodiscard]] static double model(const Vector3& at_e, const BatchMember& s, Vector3& u) {
     if constexpr (kObservable == Observable::doppler) {
       u = s.satellite_e_m;
       return u.dot(at_e);
@@ -208,7 +210,7 @@ enum class AmbiguityConstraint : std::uint8_t {
 /// (a - b - mean) / sigma, cycles; b may be absent.
 template <AmbiguityConstraint kPurpose>
 struct AmbiguityFactor {
-  using Scalar = double;
+  using Scalar = math::DeferredFor<double, kPurpose>;
   static constexpr int max_rows = 1, max_keys = 2, max_columns = 2;
   static constexpr const char* name =
       kPurpose == AmbiguityConstraint::datum ? "ambiguity datum" : kPurpose == AmbiguityConstraint::continuity ? "ambiguity walk" : "integer fix";
@@ -227,7 +229,7 @@ struct AmbiguityFactor {
     e[0] = (difference - mean_cycles) / sigma_cycles;
   }
   template <class Values>
-  void linearise(const Values& values, double* e, smoother::JacobianRef<double> J) const {
+  void linearise(const Values& values, double* e, smoother::JacobianRef<Scalar> J) const {
     evaluate(values, e);
     J(0, 0) = 1 / sigma_cycles;
     if (b.valid()) J(0, 1) = -1 / sigma_cycles;

@@ -17,13 +17,13 @@ namespace searvins::gnss {
 
 namespace detail {
 /// A real number as a variable.
-template <class Self, smoother::Role kRole>
+template <class Self, class S, smoother::Role kRole>
 struct RealVariable {
-  using Scalar = double;
-  using Step = Eigen::Matrix<double, 1, 1>;
+  using Scalar = S;
+  using Step = Eigen::Matrix<Scalar, 1, 1>;
   static constexpr int dof = 1;
   static constexpr smoother::Role role = kRole;
-  double value{0};
+  Scalar value{0};
   [[nodiscard]] Self retract(const Step& d) const {
     Self y;
     y.value = value + d[0];
@@ -34,19 +34,25 @@ struct RealVariable {
 }  // namespace detail
 
 /// Carrier-phase ambiguity, cycles.
-struct Ambiguity : detail::RealVariable<Ambiguity, smoother::Role::chain> {
+template <class S>
+struct BasicAmbiguity : detail::RealVariable<BasicAmbiguity<S>, S, smoother::Role::chain> {
+  using Step = Eigen::Matrix<S, 1, 1>;
   static constexpr const char* name = "ambiguity";
   static constexpr const char* axis_name(int) { return "cycles"; }
   /// Linear in every factor, so it never forces a relinearisation; a millicycle is what the convergence test resolves at its default.
-  [[nodiscard]] static Step linearisation_scale() { return Step{10.0}; }
+  [[nodiscard]] static Step linearisation_scale() { return Step{S{10}}; }
 };
+using Ambiguity = BasicAmbiguity<double>;
 
 /// Error of a batch's pivot observation, metres or m/s.
-struct PivotError : detail::RealVariable<PivotError, smoother::Role::local> {
+template <class S>
+struct BasicPivotError : detail::RealVariable<BasicPivotError<S>, S, smoother::Role::local> {
+  using Step = Eigen::Matrix<S, 1, 1>;
   static constexpr const char* name = "pivot error";
   static constexpr const char* axis_name(int) { return "metres"; }
-  [[nodiscard]] static Step linearisation_scale() { return Step{1.0}; }
+  [[nodiscard]] static Step linearisation_scale() { return Step{S{1}}; }
 };
+using PivotError = BasicPivotError<double>;
 
 static_assert(smoother::Variable<Ambiguity> && smoother::Variable<PivotError>);
 
