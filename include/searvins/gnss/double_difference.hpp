@@ -56,9 +56,12 @@ struct DifferencingOptions {
   int min_group_size{2};  ///< signals in a group, pivot included
 };
 
-/// Differencing with memory of one epoch. `sizeof` is all it ever uses.
-class Differencer {
+/// Differencing with memory of one epoch. `sizeof` is all it ever uses. Scalar: double, for ECEF metres.
+template <class Scalar>
+class BasicDifferencer {
  public:
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+
   /// Differences one rover epoch. `predicted_rover_e_m`: antenna position, good to some ten metres. The outcome does not depend on the
   /// order of satellites and signals in the epochs.
   ///
@@ -69,7 +72,7 @@ class Differencer {
   /// or out_of_order (tag not after the previous one).
   template <std::size_t B, std::size_t E>
   Status difference(const ObservationEpoch& rover, const BaseBuffer<B>& base, const EphemerisStore<E>& store,
-                    const Eigen::Vector3d& predicted_rover_e_m, const DifferencingOptions& options, DifferencedEpoch& out,
+                    const Vector3& predicted_rover_e_m, const DifferencingOptions& options, DifferencedEpoch& out,
                     const std::optional<PredictedDisplacement>& moved = {}) {
     out = DifferencedEpoch{};
     out.rover_tag = rover.tag;
@@ -136,7 +139,7 @@ class Differencer {
     std::array<const SatelliteObservation*, 2> base_satellite{};
     std::array<ReceiverLine, 2> base{};
     double predicted_range_m{0};
-    Eigen::Vector3d direction_e{Eigen::Vector3d::Zero()};
+    Vector3 direction_e{Vector3::Zero()};
   };
   /// The base side of a signal.
   struct BaseSignal {
@@ -144,7 +147,7 @@ class Differencer {
     BaseArc arc{};
   };
 
-  [[nodiscard]] Status check(const ObservationEpoch& rover, const Eigen::Vector3d& p_e_m) const {
+  [[nodiscard]] Status check(const ObservationEpoch& rover, const Vector3& p_e_m) const {
     if (!p_e_m.allFinite()) return failure(StatusCode::non_finite, "predicted rover position is not finite");
     const double r_m = p_e_m.norm();
     if (r_m < 6.25e6 || r_m > 7e6)
@@ -157,7 +160,7 @@ class Differencer {
     return ok_status();
   }
 
-  void begin_base(Context& c, const BaseMatch& match, const Eigen::Vector3d& base_e_m) {
+  void begin_base(Context& c, const BaseMatch& match, const Vector3& base_e_m) {
     c.match = match;
     c.base_epoch = {match.first, match.second};
     for (std::size_t k = 0; k < 2; ++k)
@@ -392,5 +395,6 @@ class Differencer {
   StaticVector<std::uint8_t, kMaxCorrectedSignals> pair_of_{};
   StaticVector<ContinuityVerdict, kMaxCorrectedSignals> verdicts_{};
 };
+using Differencer = BasicDifferencer<double>;
 
 }  // namespace searvins::gnss

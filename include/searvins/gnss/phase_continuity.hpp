@@ -25,6 +25,7 @@
 #include <searvins/gnss/observation.hpp>
 #include <searvins/gnss/signal.hpp>
 #include <searvins/gnss/signal_pairing.hpp>
+#include <searvins/math/deferred.hpp>
 
 namespace searvins::gnss {
 
@@ -87,7 +88,8 @@ class PhaseContinuity {
       fit = common_motion_check(changes_, results_);
       if (!fit.valid && options.predicted_motion && epoch.moved && started_) {
         // The changes are less those between the two predicted positions; what is left of the displacement is the prior's mean.
-        const Eigen::Vector3d taken_out_m = epoch.position_e_m - epoch_.position_e_m;
+        const Vector3& now_e_m = epoch.position_e_m;
+        const Vector3 taken_out_m = now_e_m - epoch_.position_e_m;
         fit = predicted_motion_check(changes_, {epoch.moved->displacement_e_m - taken_out_m, epoch.moved->covariance_e_m2}, results_);
       }
       for (std::size_t i = 0; i < changes_.size(); ++i) evidence_[origin_[i]].common_motion = results_[i];
@@ -110,6 +112,8 @@ class PhaseContinuity {
   }
 
  private:
+  using Vector3 = math::Vector3<math::DeferredFor<double, N>>;
+
   /// What the receivers report of a signal, and its changes when nothing reported speaks against continuity.
   void gather(const PhaseEpoch& epoch, const PhaseSample& now, bool consecutive, double dt_s) {
     ContinuityEvidence e;

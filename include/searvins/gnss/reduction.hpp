@@ -24,6 +24,7 @@
 #include <searvins/gnss/satellite.hpp>
 #include <searvins/gnss/signal.hpp>
 #include <searvins/gnss/weighting.hpp>
+#include <searvins/math/deferred.hpp>
 
 namespace searvins::gnss {
 
@@ -39,7 +40,8 @@ struct ReceiverPlace {
   Eigen::Vector3d position_e_m{Eigen::Vector3d::Zero()};
   geodesy::Geodetic geodetic{};
 
-  [[nodiscard]] static ReceiverPlace at(GpsTime tag, const Eigen::Vector3d& position_e_m) {
+  template <class Scalar = double>
+  [[nodiscard]] static ReceiverPlace at(GpsTime tag, const math::Vector3<Scalar>& position_e_m) {
     return {tag, position_e_m, geodesy::geodetic_from_ecef(position_e_m)};
   }
 };
@@ -52,8 +54,9 @@ struct ReceiverLine {
   double ionosphere_l1_m{0};  ///< delay on L1, to be taken from the code and added to the phase
 };
 
-/// The line of a receiver to a satellite that transmitted from `state`.
-[[nodiscard]] inline ReceiverLine line_of(const SatelliteState& state, const ReceiverPlace& place, const DelayModels& models) {
+/// The line of a receiver to a satellite that transmitted from `state`. Scalar, here and below: double, for ECEF metres.
+template <class Scalar = double>
+[[nodiscard]] ReceiverLine line_of(const SatelliteState& state, const ReceiverPlace& place, const DelayModels& models) {
   ReceiverLine line;
   line.state = state;
   line.angles = geodesy::azimuth_elevation(place.position_e_m, state.position_e_m);
@@ -67,7 +70,8 @@ struct ReceiverLine {
 
 /// State of the satellite at the transmission that a code timed, from a given record. Errors: invalid_argument (no pseudorange: not finite
 /// or over ten light seconds), those of satellite_state.
-[[nodiscard]] inline Result<SatelliteState> state_from_code(const Ephemeris& e, GpsTime tag, double code_m) {
+template <class Scalar = double>
+[[nodiscard]] Result<SatelliteState> state_from_code(const Ephemeris& e, GpsTime tag, double code_m) {
   if (!(std::abs(code_m) < 10 * kSpeedOfLightMps))
     return failure(StatusCode::invalid_argument, "pseudorange over ten light seconds", -1, -1, code_m);
   const GpsTime reading = tag.plus_seconds(-code_m / kSpeedOfLightMps);
@@ -77,11 +81,11 @@ struct ReceiverLine {
 }
 
 /// The line of a base to a satellite, its range taken out as well: of the observation only clock, ambiguity and noise remain.
-[[nodiscard]] inline Result<ReceiverLine> base_line_of(const Ephemeris& e, const ReceiverPlace& base, double code_m,
-                                                       const DelayModels& models) {
-  const Result<SatelliteState> state = state_from_code(e, base.tag, code_m);
+template <class Scalar = double>
+[[nodiscard]] Result<ReceiverLine> base_line_of(const Ephemeris& e, const ReceiverPlace& base, double code_m, const DelayModels& models) {
+  const Result<SatelliteState> state = state_from_code<Scalar>(e, base.tag, code_m);
   if (!state) return state.status();
-  ReceiverLine line = line_of(*state, base, models);
+  ReceiverLine line = line_of<Scalar>(*state, base, models);
   line.reduction_m -= range_m(base.position_e_m, state->position_e_m);
   return line;
 }
