@@ -43,6 +43,7 @@
 #include <searvins/ambiguity/success_rate.hpp>
 #include <searvins/core/status.hpp>
 #include <searvins/math/block_cholesky.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/math/quantiles.hpp>
 
 namespace searvins::ambiguity {
@@ -152,6 +153,9 @@ class Resolver {
   }
 
  private:
+  using Vector3 = math::Vector3<math::DeferredFor<double, MaxN>>;
+  using Matrix3 = math::Matrix3<math::DeferredFor<double, MaxN>>;
+
   static constexpr std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
   [[nodiscard]] ResolutionVerdict judge(const Float& f, const ResolutionOptions& options, Outcome& out) {
@@ -205,7 +209,7 @@ class Resolver {
   }
 
   [[nodiscard]] ResolutionVerdict judge_position(const Float& f, const ResolutionOptions& options, const Outcome& out) const {
-    const auto horizontal = [](const Eigen::Matrix3d& P) {
+    const auto horizontal = [](const Matrix3& P) {
       const double mean = (P(0, 0) + P(1, 1)) / 2, half = (P(0, 0) - P(1, 1)) / 2;
       return std::sqrt(std::max(0.0, mean + std::hypot(half, P(0, 1))));  // larger eigenvalue of the east-north block
     };
@@ -214,10 +218,10 @@ class Resolver {
     const double bound_h = std::max(options.max_innovation_horizontal_m, options.innovation_sigmas * horizontal(f.Q_pp));
     const double bound_v = std::max(options.max_innovation_vertical_m, options.innovation_sigmas * std::sqrt(std::max(0.0, f.Q_pp(2, 2))));
     if (out.innovation_m.template head<2>().norm() > bound_h || std::abs(out.innovation_m.z()) > bound_v) return ResolutionVerdict::innovation;
-    Eigen::Matrix3d L = explained_;
-    const Eigen::Vector3d reference = L.diagonal();
+    Matrix3 L = explained_;
+    const Vector3 reference = L.diagonal();
     if (!math::partial_cholesky(L.data(), 3, 3, 3, reference.data()).ok()) return ResolutionVerdict::ill_conditioned;
-    Eigen::Vector3d y = out.innovation_m;
+    Vector3 y = out.innovation_m;
     math::solve_lower(L.data(), 3, 3, y.data());
     return y.squaredNorm() > options.max_innovation_statistic ? ResolutionVerdict::innovation : ResolutionVerdict::accepted;
   }
@@ -258,7 +262,7 @@ class Resolver {
   std::array<double, static_cast<std::size_t>(MaxN)> a_{}, v_{}, solution_{}, work_{}, reference_{};
   std::array<std::array<double, static_cast<std::size_t>(MaxN)>, 3> column_{};
   std::array<double, static_cast<std::size_t>(MaxN) * MaxN> Q_{}, L_{};
-  Eigen::Matrix3d explained_{Eigen::Matrix3d::Zero()};
+  Matrix3 explained_{Matrix3::Zero()};
 };
 
 }  // namespace searvins::ambiguity
