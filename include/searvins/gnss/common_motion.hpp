@@ -35,6 +35,7 @@
 #include <searvins/core/static_vector.hpp>
 #include <searvins/gnss/cycle_slip.hpp>
 #include <searvins/gnss/signal.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/math/small_cholesky.hpp>
 
 namespace searvins::gnss {
@@ -66,18 +67,21 @@ struct MotionPrior {
 namespace detail {
 
 /// [d; c], or the row [u' 1] of a change.
-using Row4 = Eigen::Matrix<double, 4, 1>;
+template <class Scalar>
+using Row4 = Eigen::Matrix<Scalar, 4, 1>;
 
 /// Inverse of a symmetric positive definite 4x4 by Cholesky: A = L L', A^-1 = L^-T L^-1. False when a pivot is below 1e-6 of the diagonal.
-[[nodiscard]] inline bool invert_spd4(const Eigen::Matrix4d& a, Eigen::Matrix4d& inverse) {
-  Eigen::Matrix4d l = Eigen::Matrix4d::Zero(), m = Eigen::Matrix4d::Zero();
+template <class Scalar = double>
+[[nodiscard]] bool invert_spd4(const math::Matrix<Scalar, 4, 4>& a, math::Matrix<Scalar, 4, 4>& inverse) {
+  using Matrix4 = Eigen::Matrix<Scalar, 4, 4>;
+  Matrix4 l = Matrix4::Zero(), m = Matrix4::Zero();
   for (int j = 0; j < 4; ++j) {
-    double d = a(j, j);
+    Scalar d = a(j, j);
     for (int k = 0; k < j; ++k) d -= l(j, k) * l(j, k);
     if (!(d > 1e-6 * a(j, j))) return false;
     l(j, j) = std::sqrt(d);
     for (int i = j + 1; i < 4; ++i) {
-      double s = a(i, j);
+      Scalar s = a(i, j);
       for (int k = 0; k < j; ++k) s -= l(i, k) * l(j, k);
       l(i, j) = s / l(j, j);
     }
@@ -85,7 +89,7 @@ using Row4 = Eigen::Matrix<double, 4, 1>;
   for (int j = 0; j < 4; ++j) {  // m = L^-1, column by column
     m(j, j) = 1 / l(j, j);
     for (int i = j + 1; i < 4; ++i) {
-      double s = 0;
+      Scalar s = 0;
       for (int k = j; k < i; ++k) s -= l(i, k) * m(k, j);
       m(i, j) = s / l(i, i);
     }
@@ -95,24 +99,28 @@ using Row4 = Eigen::Matrix<double, 4, 1>;
 }
 
 /// Normal equations that grow row by row.
+template <class Scalar>
 struct MotionEquations {
-  Eigen::Matrix4d normal{Eigen::Matrix4d::Zero()};
-  Row4 right{Row4::Zero()};
+  using Row = Row4<Scalar>;
+  using Normal = Eigen::Matrix<Scalar, 4, 4>;
+  Normal normal{Normal::Zero()};
+  Row right{Row::Zero()};
 
   void add(const PhaseChange& c) {
-    const Row4 a{c.direction_e.x(), c.direction_e.y(), c.direction_e.z(), 1.0};
+    const Row a{c.direction_e.x(), c.direction_e.y(), c.direction_e.z(), 1.0};
     normal += a * a.transpose();
     right += c.change_m * a;
   }
-  [[nodiscard]] bool solve(Row4& x, Eigen::Matrix4d& normal_inverse) const {
-    if (!invert_spd4(normal, normal_inverse)) return false;
+  [[nodiscard]] bool solve(Row& x, Normal& normal_inverse) const {
+    if (!invert_spd4<Scalar>(normal, normal_inverse)) return false;
     x = normal_inverse * right;
     return true;
   }
 };
 
-[[nodiscard]] inline double motion_residual_m(const PhaseChange& c, const Row4& x) {
-  return c.change_m - c.direction_e.dot(x.head<3>()) - x(3);
+template <class Scalar>
+[[nodiscard]] double motion_residual_m(const PhaseChange& c, const Row4<Scalar>& x) {
+  return c.change_m - c.direction_e.dot(x.template head<3>()) - x(3);
 }
 
 /// The four members of the set of rank `rank` among all sets of four of 0..n-1, in lexicographic order.
@@ -139,8 +147,8 @@ struct MotionEquations {
 }
 
 /// sum of min(r^2 / threshold^2, 1) over the changes at x = [d; c]; the sum ends early once it has reached `enough`.
-template <std::size_t N>
-[[nodiscard]] double truncated_cost(const StaticVector<PhaseChange, N>& changes, const Row4& x, double enough) {
+template <std::size_t N, class Scalar>
+[[nodiscard]] double truncated_cost(const StaticVector<PhaseChange, N>& changes, const Row4<Scalar>& x, double enough) {
   double cost = 0;
   for (std::size_t i = 0; i < changes.size() && cost < enough; ++i) {
     const double z = motion_residual_m(changes[i], x) / changes[i].threshold_m;
@@ -150,9 +158,9 @@ template <std::size_t N>
 }
 
 /// Best [d; c] among at most 128 sets of four satellites; `first[k]`: first change of satellite k. False when no set is solvable.
-template <std::size_t N>
+template <std::size_t N, class Scalar>
 [[nodiscard]] bool motion_by_consensus(const StaticVector<PhaseChange, N>& changes, const StaticVector<std::uint16_t, N>& first,
-                                       Row4& best) {
+                                       Row4<Scalar>& best) {
   constexpr std::size_t most_sets = 128;
   const std::size_t n = first.size(), sets = n * (n - 1) * (n - 2) * (n - 3) / 24;
   const std::size_t tries = std::min(sets, most_sets);
@@ -160,10 +168,10 @@ template <std::size_t N>
   const std::size_t step = tries == sets ? 1 : static_cast<std::size_t>(0.6180339887 * static_cast<double>(sets));
   double least = static_cast<double>(changes.size()) + 1;
   for (std::size_t t = 0, rank = 0; t < tries; ++t, rank = (rank + step) % sets) {
-    MotionEquations four;
+    MotionEquations<Scalar> four;
     for (const std::size_t k : set_of_four(n, rank)) four.add(changes[first[k]]);
-    Row4 x;
-    Eigen::Matrix4d unused;
+    Row4<Scalar> x;
+    Eigen::Matrix<Scalar, 4, 4> unused;
     if (!four.solve(x, unused)) continue;
     const double cost = truncated_cost(changes, x, least);
     if (cost < least) least = cost, best = x;
@@ -180,16 +188,16 @@ void satellites_of(const StaticVector<PhaseChange, N>& changes, StaticVector<std
 
 /// Least squares from x over what agrees, until the set stays; then the verdicts. `known`: equations that take part from the beginning (a prior). At least
 /// min_satellites, and at least 60 % of all, must agree. s_m: sigma of a change where a prior takes part, else 0.
-template <std::size_t N>
-MotionFit fit_and_judge(const StaticVector<PhaseChange, N>& changes, const StaticVector<std::uint16_t, N>& first, Row4 x,
-                        const MotionEquations& known, int min_satellites, double s_m, StaticVector<CheckResult, N>& results) {
+template <std::size_t N, class Scalar>
+MotionFit fit_and_judge(const StaticVector<PhaseChange, N>& changes, const StaticVector<std::uint16_t, N>& first, Row4<Scalar> x,
+                        const MotionEquations<Scalar>& known, int min_satellites, double s_m, StaticVector<CheckResult, N>& results) {
   constexpr double least_redundancy = 0.2;  // 1 - leverage: below it the others do not predict the satellite
   MotionFit fit;
   StaticVector<std::uint8_t, N> votes;
   votes.resize(changes.size());
-  Eigen::Matrix4d normal_inverse = Eigen::Matrix4d::Zero();
+  Eigen::Matrix<Scalar, 4, 4> normal_inverse = Eigen::Matrix<Scalar, 4, 4>::Zero();
   for (int iteration = 0; iteration < 8; ++iteration) {
-    MotionEquations agreeing = known;
+    MotionEquations<Scalar> agreeing = known;
     bool changed = iteration == 0;
     for (std::size_t i = 0; i < changes.size(); ++i) {
       const std::uint8_t vote = std::abs(motion_residual_m(changes[i], x)) < changes[i].threshold_m ? 1 : 0;
@@ -213,7 +221,7 @@ MotionFit fit_and_judge(const StaticVector<PhaseChange, N>& changes, const Stati
     const std::size_t begin = first[k], end = k + 1 < first.size() ? first[k + 1] : changes.size();
     double voters = 0;
     for (std::size_t i = begin; i < end; ++i) voters += votes[i];
-    const Row4 a{changes[begin].direction_e.x(), changes[begin].direction_e.y(), changes[begin].direction_e.z(), 1.0};
+    const Row4<Scalar> a{changes[begin].direction_e.x(), changes[begin].direction_e.y(), changes[begin].direction_e.z(), 1.0};
     const double redundancy = 1 - voters * a.dot(normal_inverse * a);
     for (std::size_t i = begin; i < end; ++i) {
       const double r = motion_residual_m(changes[i], x);
@@ -222,35 +230,36 @@ MotionFit fit_and_judge(const StaticVector<PhaseChange, N>& changes, const Stati
     }
   }
   fit.valid = true;
-  fit.displacement_e_m = x.head<3>();
+  fit.displacement_e_m = x.template head<3>();
   fit.clock_m = x(3);
   fit.rms_m = std::sqrt(sum / count);
   return fit;
 }
 
 /// The equations of a prior, in units of a change's sigma s_m; `inverse`: of its covariance.
-[[nodiscard]] inline MotionEquations prior_equations(const MotionPrior& prior, const Eigen::Matrix3d& inverse, double s_m) {
-  MotionEquations known;
-  const Eigen::Matrix3d information = s_m * s_m * inverse;
-  known.normal.topLeftCorner<3, 3>() = information;
-  known.right.head<3>() = information * prior.mean_e_m;
+template <class Scalar>
+[[nodiscard]] MotionEquations<Scalar> prior_equations(const MotionPrior& prior, const math::Matrix3<Scalar>& inverse, double s_m) {
+  MotionEquations<Scalar> known;
+  const Eigen::Matrix<Scalar, 3, 3> information = s_m * s_m * inverse;
+  known.normal.template topLeftCorner<3, 3>() = information;
+  known.right.template head<3>() = information * prior.mean_e_m;
   return known;
 }
 
 /// Best [d; c] among those that begin at the prior and the clock of one satellite; false when none is solvable.
-template <std::size_t N>
+template <std::size_t N, class Scalar>
 [[nodiscard]] bool motion_by_prior(const StaticVector<PhaseChange, N>& changes, const StaticVector<std::uint16_t, N>& first,
-                                   const MotionPrior& prior, const MotionEquations& known, Row4& best) {
+                                   const MotionPrior& prior, const MotionEquations<Scalar>& known, Row4<Scalar>& best) {
   double least = static_cast<double>(changes.size()) + 1;
   for (const std::uint16_t k : first) {
-    MotionEquations near = known;
+    MotionEquations<Scalar> near = known;
     for (const PhaseChange& c : changes) {  // within the threshold and three sigmas of what the prior leaves open between the two
-      const Eigen::Vector3d between = c.direction_e - changes[k].direction_e;
+      const Eigen::Matrix<Scalar, 3, 1> between = c.direction_e - changes[k].direction_e;
       const double off_m = c.change_m - changes[k].change_m - between.dot(prior.mean_e_m);
       if (std::abs(off_m) < c.threshold_m + 3 * std::sqrt(between.dot(prior.covariance_e_m2 * between))) near.add(c);
     }
-    Row4 x;
-    Eigen::Matrix4d unused;
+    Row4<Scalar> x;
+    Eigen::Matrix<Scalar, 4, 4> unused;
     if (!near.solve(x, unused)) continue;
     const double cost = truncated_cost(changes, x, least);
     if (cost < least) least = cost, best = x;
@@ -264,12 +273,13 @@ template <std::size_t N>
 /// of all, must agree, else nothing is said.
 template <std::size_t N>
 MotionFit common_motion_check(const StaticVector<PhaseChange, N>& changes, StaticVector<CheckResult, N>& results) {
+  using Scalar = math::DeferredFor<double, N>;
   constexpr int min_satellites = 5;
   results.clear();
   results.resize(changes.size());
   StaticVector<std::uint16_t, N> first;
   detail::satellites_of(changes, first);
-  detail::Row4 x;
+  detail::Row4<Scalar> x;
   if (first.size() < min_satellites || !detail::motion_by_consensus(changes, first, x)) return {};
   return detail::fit_and_judge(changes, first, x, {}, min_satellites, 0, results);
 }
@@ -278,6 +288,7 @@ MotionFit common_motion_check(const StaticVector<PhaseChange, N>& changes, Stati
 template <std::size_t N>
 MotionFit predicted_motion_check(const StaticVector<PhaseChange, N>& changes, const MotionPrior& prior,
                                  StaticVector<CheckResult, N>& results) {
+  using Scalar = math::DeferredFor<double, N>;
   constexpr int min_satellites = 2;
   results.clear();
   results.resize(changes.size());
@@ -286,8 +297,8 @@ MotionFit predicted_motion_check(const StaticVector<PhaseChange, N>& changes, co
   const math::SmallCholesky<3> covariance(prior.covariance_e_m2);
   if (first.size() < min_satellites || !covariance.ok()) return {};
   const double s_m = changes[0].threshold_m / 7;
-  const detail::MotionEquations known = detail::prior_equations(prior, covariance.inverse(), s_m);
-  detail::Row4 x;
+  const detail::MotionEquations<Scalar> known = detail::prior_equations<Scalar>(prior, covariance.inverse(), s_m);
+  detail::Row4<Scalar> x;
   if (!detail::motion_by_prior(changes, first, prior, known, x)) return {};
   return detail::fit_and_judge(changes, first, x, known, min_satellites, s_m, results);
 }
