@@ -72,7 +72,7 @@ using Row4 = Eigen::Matrix<Scalar, 4, 1>;
 
 /// Inverse of a symmetric positive definite 4x4 by Cholesky: A = L L', A^-1 = L^-T L^-1. False when a pivot is below 1e-6 of the diagonal.
 template <class Scalar = double>
-[[nodiscard]] bool invert_spd4(const math::Matrix<Scalar, 4, 4>& a, math::Matrix<Scalar, 4, 4>& inverse) {
+[[nodiscard]] inline bool invert_spd4(const math::Matrix<Scalar, 4, 4>& a, math::Matrix<Scalar, 4, 4>& inverse) {
   using Matrix4 = Eigen::Matrix<Scalar, 4, 4>;
   Matrix4 l = Matrix4::Zero(), m = Matrix4::Zero();
   for (int j = 0; j < 4; ++j) {
@@ -119,7 +119,7 @@ struct MotionEquations {
 };
 
 template <class Scalar>
-[[nodiscard]] double motion_residual_m(const PhaseChange& c, const Row4<Scalar>& x) {
+[[nodiscard]] inline double motion_residual_m(const PhaseChange& c, const Row4<Scalar>& x) {
   return c.change_m - c.direction_e.dot(x.template head<3>()) - x(3);
 }
 
@@ -238,7 +238,7 @@ MotionFit fit_and_judge(const StaticVector<PhaseChange, N>& changes, const Stati
 
 /// The equations of a prior, in units of a change's sigma s_m; `inverse`: of its covariance.
 template <class Scalar>
-[[nodiscard]] MotionEquations<Scalar> prior_equations(const MotionPrior& prior, const math::Matrix3<Scalar>& inverse, double s_m) {
+[[nodiscard]] inline MotionEquations<Scalar> prior_equations(const MotionPrior& prior, const math::Matrix3<Scalar>& inverse, double s_m) {
   MotionEquations<Scalar> known;
   const Eigen::Matrix<Scalar, 3, 3> information = s_m * s_m * inverse;
   known.normal.template topLeftCorner<3, 3>() = information;

@@ -62,7 +62,7 @@ using Pva = BasicPva<double>;
 
 /// Antenna position of a state in w, metres; optionally d p / d state.
 template <class Scalar>
-Eigen::Matrix<Scalar, 3, 1> antenna_position_w_m(const BasicPva<Scalar>& x, math::Matrix<Scalar, 3, 9>* jacobian = nullptr) {
+inline Eigen::Matrix<Scalar, 3, 1> antenna_position_w_m(const BasicPva<Scalar>& x, math::Matrix<Scalar, 3, 9>* jacobian = nullptr) {
   if (jacobian) {
     jacobian->setZero();
     jacobian->template leftCols<3>().setIdentity();
@@ -72,7 +72,7 @@ Eigen::Matrix<Scalar, 3, 1> antenna_position_w_m(const BasicPva<Scalar>& x, math
 
 /// Antenna velocity of a state in w, m/s; optionally d v / d state.
 template <class Scalar>
-Eigen::Matrix<Scalar, 3, 1> antenna_velocity_w_mps(const BasicPva<Scalar>& x, math::Matrix<Scalar, 3, 9>* jacobian = nullptr) {
+inline Eigen::Matrix<Scalar, 3, 1> antenna_velocity_w_mps(const BasicPva<Scalar>& x, math::Matrix<Scalar, 3, 9>* jacobian = nullptr) {
   if (jacobian) {
     jacobian->setZero();
     jacobian->template middleCols<3>(3).setIdentity();

@@ -56,7 +56,7 @@ struct ReceiverLine {
 
 /// The line of a receiver to a satellite that transmitted from `state`. Scalar, here and below: double, for ECEF metres.
 template <class Scalar = double>
-[[nodiscard]] ReceiverLine line_of(const SatelliteState& state, const ReceiverPlace& place, const DelayModels& models) {
+[[nodiscard]] inline ReceiverLine line_of(const SatelliteState& state, const ReceiverPlace& place, const DelayModels& models) {
   ReceiverLine line;
   line.state = state;
   line.angles = geodesy::azimuth_elevation(place.position_e_m, state.position_e_m);
@@ -71,7 +71,7 @@ template <class Scalar = double>
 /// State of the satellite at the transmission that a code timed, from a given record. Errors: invalid_argument (no pseudorange: not finite
 /// or over ten light seconds), those of satellite_state.
 template <class Scalar = double>
-[[nodiscard]] Result<SatelliteState> state_from_code(const Ephemeris& e, GpsTime tag, double code_m) {
+[[nodiscard]] inline Result<SatelliteState> state_from_code(const Ephemeris& e, GpsTime tag, double code_m) {
   if (!(std::abs(code_m) < 10 * kSpeedOfLightMps))
     return failure(StatusCode::invalid_argument, "pseudorange over ten light seconds", -1, -1, code_m);
   const GpsTime reading = tag.plus_seconds(-code_m / kSpeedOfLightMps);
@@ -82,7 +82,8 @@ template <class Scalar = double>
 
 /// The line of a base to a satellite, its range taken out as well: of the observation only clock, ambiguity and noise remain.
 template <class Scalar = double>
-[[nodiscard]] Result<ReceiverLine> base_line_of(const Ephemeris& e, const ReceiverPlace& base, double code_m, const DelayModels& models) {
+[[nodiscard]] inline Result<ReceiverLine> base_line_of(const Ephemeris& e, const ReceiverPlace& base, double code_m,
+                                                       const DelayModels& models) {
   const Result<SatelliteState> state = state_from_code<Scalar>(e, base.tag, code_m);
   if (!state) return state.status();
   ReceiverLine line = line_of<Scalar>(*state, base, models);
