@@ -20,6 +20,7 @@
 #include <searvins/core/status.hpp>
 #include <searvins/core/time.hpp>
 #include <searvins/imu/navigation_state.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/smoother/factor.hpp>
 #include <searvins/smoother/variable.hpp>
 #include <searvins/vision/calibrating_stereo_factor.hpp>
@@ -31,30 +32,32 @@
 namespace searvins::estimator {
 
 /// See the file comment.
-class KnownCamera {
+template <class Scalar>
+class BasicKnownCamera {
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+
  public:
   static constexpr bool calibrates = false;
-  using Factor = vision::StereoFactor<>;
+  using Camera = vision::StereoCamera<Scalar>;
+  using Factor = math::Deferred<vision::StereoFactor<>, Scalar>;
   template <class Cap>
   using Variables = smoother::Types<>;
   template <class Cap>
   using Factors = smoother::Types<smoother::Capacity<Factor, Cap::stereo_observations>>;
 
-  explicit KnownCamera(const vision::CameraCorrectionOptions& = {}) {}
+  explicit BasicKnownCamera(const vision::CameraCorrectionOptions& = {}) {}
 
   /// A frame of this time is about to become factors.
   template <class Smoother>
   void begin_frame(Smoother&, GpsTime) {}
   /// The camera at a frame, in the body at the state.
-  [[nodiscard]] vision::StereoCamera<double> placed(const vision::StereoCamera<double>& nominal, const Eigen::Matrix3d& R_wb,
-                                                    const vision::FrameMotion& motion) const {
+  [[nodiscard]] Camera placed(const Camera& nominal, const Matrix3& R_wb, const vision::FrameMotion& motion) const {
     return motion.late_s == 0 ? nominal : vision::carried(nominal, motion.late_s, R_wb.transpose() * motion.v_w_mps, motion.rate_b_radps);
   }
   /// An observation of a frame; `there`: placed(nominal). Errors: those of StereoFactor::make.
   [[nodiscard]] Result<Factor> observation(smoother::Key<imu::NavigationState> state, smoother::Key<vision::Landmark> landmark,
-                                           const vision::StereoCamera<double>&, const vision::StereoCamera<double>& there, const vision::FrameMotion&,
-                                           const vision::StereoPixel<double>& pixel, const Eigen::Matrix3d& covariance_px2,
-                                           vision::Eyes eyes = vision::Eyes::both) const {
+                                           const Camera&, const Camera& there, const vision::FrameMotion&, const vision::StereoPixel<Scalar>& pixel,
+                                           const Matrix3& covariance_px2, vision::Eyes eyes = vision::Eyes::both) const {
     return Factor::make(state, landmark, there, pixel, covariance_px2, 1, {}, eyes);
   }
   /// The window was optimised.
@@ -62,21 +65,29 @@ class KnownCamera {
   void remember(Smoother&) {}
 };
 
+/// What this library computes with.
+using KnownCamera = BasicKnownCamera<double>;
+
 /// See the file comment.
-class CalibratedCamera {
+template <class Scalar>
+class BasicCalibratedCamera {
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+  using Matrix4 = Eigen::Matrix<Scalar, 4, 4>;
   static constexpr int kCorrections = 8;  ///< in the window
   static constexpr double kDoubt = 3;     ///< sigmas of what a lost window said
 
  public:
   static constexpr bool calibrates = true;
-  using Factor = vision::CalibratingStereoFactor<>;
+  using Camera = vision::StereoCamera<Scalar>;
+  using Seen = math::Deferred<vision::StereoFactor<>, Scalar>;
+  using Factor = math::Deferred<vision::CalibratingStereoFactor<>, Scalar>;
   template <class Cap>
   using Variables = smoother::Types<smoother::Capacity<vision::CameraCorrection, kCorrections>>;
   template <class Cap>
   using Factors = smoother::Types<smoother::Capacity<Factor, Cap::stereo_observations>, smoother::Capacity<vision::CameraCorrectionPriorFactor, kCorrections>,
                                   smoother::Capacity<vision::CameraCorrectionWalk, kCorrections>>;
 
-  explicit CalibratedCamera(const vision::CameraCorrectionOptions& options = {}) : options_(options) {
+  explicit BasicCalibratedCamera(const vision::CameraCorrectionOptions& options = {}) : options_(options) {
     estimate_.covariance = vision::prior_covariance(options);
   }
 
@@ -93,18 +104,15 @@ class CalibratedCamera {
     if (!held) return void(smoother.remove_variable(*next));
     key_ = *next, begun_ = time;
   }
-  [[nodiscard]] vision::StereoCamera<double> placed(const vision::StereoCamera<double>& nominal, const Eigen::Matrix3d& R_wb,
-                                                    const vision::FrameMotion& motion) const {
-    vision::StereoCamera<double> camera =
-        vision::carried(nominal, motion.late_s + estimate_.value.time_offset_s, R_wb.transpose() * motion.v_w_mps, motion.rate_b_radps);
+  [[nodiscard]] Camera placed(const Camera& nominal, const Matrix3& R_wb, const vision::FrameMotion& motion) const {
+    Camera camera = vision::carried(nominal, motion.late_s + estimate_.value.time_offset_s, R_wb.transpose() * motion.v_w_mps, motion.rate_b_radps);
     camera.R_bc = camera.R_bc * estimate_.value.R_nc;
     return camera;
   }
   [[nodiscard]] Result<Factor> observation(smoother::Key<imu::NavigationState> state, smoother::Key<vision::Landmark> landmark,
-                                           const vision::StereoCamera<double>& nominal, const vision::StereoCamera<double>&, const vision::FrameMotion& motion,
-                                           const vision::StereoPixel<double>& pixel, const Eigen::Matrix3d& covariance_px2,
-                                           vision::Eyes eyes = vision::Eyes::both) const {
-    const auto seen = vision::StereoFactor<>::make(state, landmark, nominal, pixel, covariance_px2, 1, {}, eyes);
+                                           const Camera& nominal, const Camera&, const vision::FrameMotion& motion, const vision::StereoPixel<Scalar>& pixel,
+                                           const Matrix3& covariance_px2, vision::Eyes eyes = vision::Eyes::both) const {
+    const auto seen = Seen::make(state, landmark, nominal, pixel, covariance_px2, 1, {}, eyes);
     return seen.ok() ? Factor::make(*seen, key_, motion) : seen.status();
   }
   template <class Smoother>
@@ -124,8 +132,8 @@ class CalibratedCamera {
   }
   template <class Smoother>
   [[nodiscard]] bool hold(Smoother& smoother, smoother::Key<vision::CameraCorrection> next, GpsTime time) const {
-    const Eigen::Matrix4d first = vision::prior_covariance(options_);
-    Eigen::Matrix4d P = estimate_.covariance;
+    const Matrix4 first = vision::prior_covariance(options_);
+    Matrix4 P = estimate_.covariance;
     if (was_used_) P = kDoubt * kDoubt * P + vision::walk_covariance(options_, std::max(0.0, seconds_between(remembered_, time)));
     if ((P.diagonal() - first.diagonal()).maxCoeff() > 0) P = first;
     const auto prior = vision::CameraCorrectionPriorFactor::make(next, estimate_.value, P);
@@ -138,5 +146,8 @@ class CalibratedCamera {
   GpsTime begun_{}, remembered_{};
   bool was_used_{false};
 };
+
+/// What this library computes with.
+using CalibratedCamera = BasicCalibratedCamera<double>;
 
 }  // namespace searvins::estimator

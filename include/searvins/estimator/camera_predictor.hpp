@@ -22,27 +22,34 @@
 #include <searvins/core/time.hpp>
 #include <searvins/estimator/rtk_solution.hpp>
 #include <searvins/geodesy/wgs84.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/vision/camera_motion.hpp>
 #include <searvins/vision/stereo_camera.hpp>
 
 namespace searvins::estimator {
 
 /// See the file comment. Ask once a frame that the frontend is offered, in order of time.
-class CameraPredictor {
+template <class Scalar>
+class BasicCameraPredictor {
  public:
+  using Solution = math::Deferred<RtkSolution, Scalar>;
+  using CameraMotion = math::Deferred<vision::CameraMotion, Scalar>;
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+
   /// The camera in the body, and the antenna's lever arm in body axes, metres.
-  CameraPredictor(const vision::StereoCamera<double>& camera, const Eigen::Vector3d& lever_arm_b_m)
+  BasicCameraPredictor(const vision::StereoCamera<Scalar>& camera, const Vector3& lever_arm_b_m)
       : R_bc_(camera.R_bc), arm_b_m_(camera.p_bc_m - lever_arm_b_m) {}
 
   /// Motion of the left camera since the last frame; nothing at the first one, or where either has no attitude, or more than
   /// `kLongestS` lie between them. `now`: the prediction at the frame, nothing while there is none.
-  [[nodiscard]] std::optional<vision::CameraMotion> motion_to(const std::optional<RtkSolution>& now) {
+  [[nodiscard]] std::optional<CameraMotion> motion_to(const std::optional<Solution>& now) {
     std::optional<Place> place;
     if (now && now->has_attitude && now->velocity_e_mps.allFinite() && now->R_nb.allFinite()) {
-      const Eigen::Matrix3d R_en = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(now->position_e_m));
+      const Matrix3 R_en = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(now->position_e_m));
       place = Place{now->time, now->R_nb, R_en.transpose() * now->velocity_e_mps};
     }
-    std::optional<vision::CameraMotion> motion;
+    std::optional<CameraMotion> motion;
     if (place && before_) motion = between(*before_, *place);
     before_ = place;
     return motion;
@@ -53,22 +60,25 @@ class CameraPredictor {
 
   struct Place {
     GpsTime time{};
-    Eigen::Matrix3d R_nb{Eigen::Matrix3d::Identity()};
-    Eigen::Vector3d v_n_mps{Eigen::Vector3d::Zero()};
+    Matrix3 R_nb{Matrix3::Identity()};
+    Vector3 v_n_mps{Vector3::Zero()};
   };
 
-  [[nodiscard]] std::optional<vision::CameraMotion> between(const Place& a, const Place& b) const {
+  [[nodiscard]] std::optional<CameraMotion> between(const Place& a, const Place& b) const {
     const double dt_s = seconds_between(a.time, b.time);
     if (!(dt_s > 0) || dt_s > kLongestS) return std::nullopt;
-    const Eigen::Vector3d way_n_m = 0.5 * dt_s * (a.v_n_mps + b.v_n_mps) + (b.R_nb - a.R_nb) * arm_b_m_;
-    const Eigen::Matrix3d R_cn = (a.R_nb * R_bc_).transpose();
-    vision::CameraMotion motion{R_cn * b.R_nb * R_bc_, R_cn * way_n_m};
+    const Vector3 way_n_m = 0.5 * dt_s * (a.v_n_mps + b.v_n_mps) + (b.R_nb - a.R_nb) * arm_b_m_;
+    const Matrix3 R_cn = (a.R_nb * R_bc_).transpose();
+    CameraMotion motion{R_cn * b.R_nb * R_bc_, R_cn * way_n_m};
     return motion.finite() ? std::optional{motion} : std::nullopt;
   }
 
-  Eigen::Matrix3d R_bc_;
-  Eigen::Vector3d arm_b_m_;
+  Matrix3 R_bc_;
+  Vector3 arm_b_m_;
   std::optional<Place> before_;
 };
+
+/// What this library computes with.
+using CameraPredictor = BasicCameraPredictor<double>;
 
 }  // namespace searvins::estimator

@@ -37,6 +37,7 @@
 #include <searvins/imu/initializer.hpp>
 #include <searvins/imu/position_fix.hpp>
 #include <searvins/imu/preintegration.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/stationary/detector.hpp>
 
 namespace searvins::estimator {
@@ -103,6 +104,9 @@ class Estimator {
   using Free = RtkEstimator<RtkConfig<Form, typename WithoutCamera<CapacityType>::type>>;
   using Bound = RtkEstimator<RtkConfig<Form, CapacityType, Motion>>;
   using Options = BasicEstimatorOptions<typename Motion::Options>;
+  using Vector3 = typename Bound::Vector3;
+  using Matrix3 = typename Bound::Matrix3;
+  using LocalFrame = typename Bound::LocalFrame;
 
   using CodePhaseForm = typename Bound::CodePhaseForm;
   using DopplerForm = typename Bound::DopplerForm;
@@ -379,11 +383,11 @@ class Estimator {
     s.status = Bound::status_of_quality(fix.quality);
     s.position_e_m = fix.position_e_m;
     s.satellites = std::max(0, fix.satellites);
-    const Eigen::Matrix3d R = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(fix.position_e_m)).transpose();
+    const Matrix3 R_en = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(fix.position_e_m)), R = R_en.transpose();
     s.covariance_enu_m2 = R * fix.covariance_e_m2 * R.transpose();
     const double sigma_v = fix.has_velocity() ? fix.sigma_velocity_mps : kNoVelocityMps;
     if (fix.has_velocity()) s.velocity_e_mps = fix.velocity_e_mps;
-    s.velocity_covariance_enu = Eigen::Matrix3d::Identity() * sigma_v * sigma_v;
+    s.velocity_covariance_enu = Matrix3::Identity() * sigma_v * sigma_v;
     return s;
   }
 
@@ -417,21 +421,22 @@ class Estimator {
 
   /// Aligns with the GNSS solution of an epoch, and starts the inertial window when that is done.
   void align(const RtkSolution& s) {
-    if (!has_frame_) frame_ = geodesy::LocalFrame::at(s.position_e_m), has_frame_ = true;
+    if (!has_frame_) frame_ = LocalFrame::at(s.position_e_m), has_frame_ = true;
     const Earth earth{frame_};
-    const Eigen::Vector3d p_w_m = frame_.to_local(s.position_e_m), v_w_mps = frame_.R_ew.transpose() * s.velocity_e_mps;
+    const Matrix3 &position_covariance = s.covariance_enu_m2, &velocity_covariance = s.velocity_covariance_enu;
+    const Vector3 p_w_m = frame_.to_local(s.position_e_m), v_w_mps = frame_.R_ew.transpose() * s.velocity_e_mps;
     (void)initializer_.set_local_gravity(earth.gravity_w_mps2(p_w_m), imu::RotatingEarth{frame_}.rate_w_radps());
-    const double sigma_v = std::sqrt(std::max(1e-4, s.velocity_covariance_enu.trace() / 3));
+    const double sigma_v = std::sqrt(std::max(1e-4, velocity_covariance.trace() / 3));
     if (s.status != SolutionStatus::dr && sigma_v < kNoVelocityMps) {
       (void)initializer_.add_velocity(s.time, v_w_mps, sigma_v);
       detector_.set_speed_hint(s.time, v_w_mps.norm(), sigma_v);
     }
     if (s.status == SolutionStatus::fix || s.status == SolutionStatus::float_)
-      (void)initializer_.add_position(s.time, p_w_m, std::sqrt(std::max(1e-4, s.covariance_enu_m2.topLeftCorner<2, 2>().trace() / 2)));
+      (void)initializer_.add_position(s.time, p_w_m, std::sqrt(std::max(1e-4, position_covariance.template topLeftCorner<2, 2>().trace() / 2)));
     if (initializer_.state() != imu::AlignmentState::aligned) return;
     const double late_s = seconds_between(last_sample_.time, s.time);  // the alignment is of the last reading
-    const Eigen::Matrix3d room = Eigen::Matrix3d::Identity() * 0.01;
-    const auto alignment = initializer_.alignment(p_w_m - late_s * v_w_mps, 4 * s.covariance_enu_m2 + room);
+    const Matrix3 room = Matrix3::Identity() * 0.01;
+    const auto alignment = initializer_.alignment(p_w_m - late_s * v_w_mps, 4 * position_covariance + room);
     if (!alignment.ok()) return;
     bound_.begin_at(alignment->state, alignment->covariance, alignment->time, frame_);
     (void)bound_.motion().add_sample(last_sample_);
@@ -458,7 +463,7 @@ class Estimator {
   Bound bound_;
   imu::Initializer initializer_;
   stationary::Detector detector_;
-  geodesy::LocalFrame frame_{};
+  LocalFrame frame_{};
   imu::Preintegration<double, 4096> ahead_{};  ///< from the newest state to the newest reading
   RingBuffer<imu::ImuSample, 8192> samples_{};
   RingBuffer<gnss::ObservationEpoch, 16> epochs_{};

@@ -18,23 +18,27 @@
 #include <searvins/geodesy/local_frame.hpp>
 #include <searvins/gnss/gnss_factors.hpp>
 #include <searvins/gnss/motion.hpp>
+#include <searvins/math/deferred.hpp>
 
 namespace searvins::estimator {
 
 /// See the file comment.
-class FreeMotion {
+template <class Scalar>
+class BasicFreeMotion {
  public:
   static constexpr bool is_inertial = false, has_camera = false;
-  using State = gnss::Pva;
+  using State = math::Deferred<gnss::Pva, Scalar>;
   using Antenna = gnss::DirectAntenna;
-  using Covariance = Eigen::Matrix<double, State::dof, State::dof>;
+  using Covariance = Eigen::Matrix<Scalar, State::dof, State::dof>;
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
   template <class Cap>
   using Variables = smoother::Types<>;
   template <class Cap>
   using Factors = smoother::Types<smoother::Capacity<gnss::PvaPriorFactor, 1>, smoother::Capacity<gnss::WhiteJerkFactor, Cap::states>>;
 
   struct Options {};
-  explicit FreeMotion(const RtkOptions& options, const Options& = {}) : options_(options) {}
+  explicit BasicFreeMotion(const RtkOptions& options, const Options& = {}) : options_(options) {}
   void set_frame(const geodesy::LocalFrame&) {}
 
   /// The antenna at the time of a state.
@@ -45,23 +49,25 @@ class FreeMotion {
   /// Covariance of the predicted state; of the position block, all that is asked for.
   [[nodiscard]] Covariance predicted_covariance(const State&, const Covariance& P, GpsTime from, GpsTime to) const {
     const double dt = seconds_between(from, to);
-    const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+    const Matrix3 I = Matrix3::Identity();
     Covariance out = P;
-    out.topLeftCorner<3, 3>() += dt * dt * P.block<3, 3>(3, 3) + options_.jerk_psd_m2ps5 * std::pow(dt, 5) / 60 * I;
+    out.template topLeftCorner<3, 3>() += dt * dt * P.template block<3, 3>(3, 3) + options_.jerk_psd_m2ps5 * std::pow(dt, 5) / 60 * I;
     return out;
   }
   /// Covariance of the antenna's position and velocity in w, of a state's.
-  [[nodiscard]] static Eigen::Matrix<double, 6, 6> antenna_covariance(const State&, const Covariance& P, const Antenna&) { return P.topLeftCorner<6, 6>(); }
+  [[nodiscard]] static Eigen::Matrix<Scalar, 6, 6> antenna_covariance(const State&, const Covariance& P, const Antenna&) {
+    return P.template topLeftCorner<6, 6>();
+  }
 
   /// A state whose antenna is at p with velocity v, in w; `near` is the predicted one.
-  [[nodiscard]] State placed(const State& near, const Antenna&, const Eigen::Vector3d& p_wa_m, const Eigen::Vector3d& v_wa_mps) const {
+  [[nodiscard]] State placed(const State& near, const Antenna&, const Vector3& p_wa_m, const Vector3& v_wa_mps) const {
     return {p_wa_m, v_wa_mps, near.a_wa_mps2};
   }
   /// A covariance after the window was given up: nothing of it counts for FreeMotion, whose start has sigmas of its own.
   [[nodiscard]] static Covariance widened(const Covariance& P, double) { return P; }
 
   /// A prediction without an inertial unit says little about integers.
-  [[nodiscard]] static bool agrees(const Eigen::Vector3d&, const Eigen::Matrix3d&, const Eigen::Vector3d&, const Eigen::Matrix3d&) { return true; }
+  [[nodiscard]] static bool agrees(const Vector3&, const Matrix3&, const Vector3&, const Matrix3&) { return true; }
 
   /// Adds what is known of a window's first state.
   template <class Smoother>
@@ -79,10 +85,13 @@ class FreeMotion {
   template <class Smoother>
   void before_marginalising(Smoother&, smoother::Key<State>) {}
   /// Attitude and biases: none.
-  void describe(const State&, const Covariance&, const Eigen::Matrix3d&, RtkSolution&) const {}
+  void describe(const State&, const Covariance&, const Matrix3&, RtkSolution&) const {}
 
  private:
   RtkOptions options_;
 };
+
+/// What this library computes with.
+using FreeMotion = BasicFreeMotion<double>;
 
 }  // namespace searvins::estimator

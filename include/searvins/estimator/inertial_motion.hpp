@@ -39,6 +39,7 @@
 #include <searvins/imu/position_fix.hpp>
 #include <searvins/imu/prediction.hpp>
 #include <searvins/imu/preintegration.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/stationary/detector.hpp>
 #include <searvins/stationary/position_anchor.hpp>
 #include <searvins/stationary/stationary_factors.hpp>
@@ -75,10 +76,13 @@ class InertialMotion {
  public:
   static constexpr bool is_inertial = true, has_camera = false;
   using EarthType = Earth;
-  using State = imu::NavigationState;
-  using Antenna = imu::LeverArm;
+  using Scalar = math::Deferred<double, Earth>;
+  using State = math::Deferred<imu::NavigationState, Earth>;
+  using Antenna = math::Deferred<imu::LeverArm, Earth>;
   using Options = InertialOptions;
-  using Covariance = imu::NavigationCovariance;
+  using Covariance = math::Deferred<imu::NavigationCovariance, Earth>;
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
   template <class Cap>
   using Variables = smoother::Types<smoother::Capacity<stationary::PositionAnchor, 4>>;
   template <class Cap>
@@ -125,19 +129,19 @@ class InertialMotion {
     return motion.ok() ? imu::predict_covariance(x, P, *motion, options_.preintegration.noise, earth_) : P;
   }
   /// Covariance of the antenna's position and velocity in w.
-  [[nodiscard]] static Eigen::Matrix<double, 6, 6> antenna_covariance(const State& x, const Covariance& P, const Antenna& antenna) {
-    Eigen::Matrix<double, 6, 15> J;
+  [[nodiscard]] static Eigen::Matrix<Scalar, 6, 6> antenna_covariance(const State& x, const Covariance& P, const Antenna& antenna) {
+    Eigen::Matrix<Scalar, 6, 15> J;
     typename Antenna::Jacobian rows;
     (void)antenna.position_w_m(x, &rows);
-    J.topRows<3>() = rows;
+    J.template topRows<3>() = rows;
     (void)antenna.velocity_w_mps(x, &rows);
-    J.bottomRows<3>() = rows;
-    const Eigen::Matrix<double, 6, 15> JP = J.lazyProduct(P);
+    J.template bottomRows<3>() = rows;
+    const Eigen::Matrix<Scalar, 6, 15> JP = J.lazyProduct(P);
     return JP.lazyProduct(J.transpose());
   }
 
   /// The predicted state moved so that its antenna is at p; its velocity is the prediction's, which no single epoch knows better.
-  [[nodiscard]] State placed(const State& predicted, const Antenna& antenna, const Eigen::Vector3d& p_wa_m, const Eigen::Vector3d&) const {
+  [[nodiscard]] State placed(const State& predicted, const Antenna& antenna, const Vector3& p_wa_m, const Vector3&) const {
     State x = predicted;
     x.p_wb_m += p_wa_m - antenna.position_w_m(predicted);
     return x;
@@ -154,9 +158,8 @@ class InertialMotion {
   }
 
   /// Whether integers that put the antenna at `fixed` agree with its prediction, both in w with their covariances.
-  [[nodiscard]] bool agrees(const Eigen::Vector3d& fixed_w_m, const Eigen::Matrix3d& fixed_m2, const Eigen::Vector3d& predicted_w_m,
-                            const Eigen::Matrix3d& predicted_m2) const {
-    const Eigen::Matrix3d S = fixed_m2 + predicted_m2 + options_.fix_jump_floor_m * options_.fix_jump_floor_m * Eigen::Matrix3d::Identity();
+  [[nodiscard]] bool agrees(const Vector3& fixed_w_m, const Matrix3& fixed_m2, const Vector3& predicted_w_m, const Matrix3& predicted_m2) const {
+    const Matrix3 S = fixed_m2 + predicted_m2 + options_.fix_jump_floor_m * options_.fix_jump_floor_m * Matrix3::Identity();
     const auto root = imu::square_root_information<3>(S);
     return root.ok() && (*root * (fixed_w_m - predicted_w_m)).squaredNorm() <= options_.max_fix_jump_statistic;
   }
@@ -195,7 +198,7 @@ class InertialMotion {
   /// Adds a position from elsewhere to a state.
   template <class Smoother>
   Status add_position(Smoother& smoother, smoother::Key<State> key, const imu::PositionFix& fix, const Antenna& antenna) const {
-    const Eigen::Matrix3d& R_ew = earth_.frame.R_ew;
+    const Matrix3& R_ew = earth_.frame.R_ew;
     const auto factor = imu::PositionFactor::make(key, antenna, earth_.frame.to_local(fix.position_e_m), R_ew.transpose() * fix.covariance_e_m2 * R_ew,
                                                   options_.position_floor_m);
     return factor.ok() ? smoother.add_factor(*factor).status() : factor.status();
@@ -203,26 +206,27 @@ class InertialMotion {
 
   /// The newest state was estimated: the next interval begins there. is_float: no integer had a part in it.
   void settle(const State& x, const Covariance& P, GpsTime t, bool is_float) {
-    is_float_ = is_float, position_covariance_m2_ = P.block<3, 3>(State::position, State::position);
-    sigma_velocity_mps_ = std::sqrt(std::max(1e-6, P.block<3, 3>(State::velocity, State::velocity).trace() / 3));
+    is_float_ = is_float, position_covariance_m2_ = P.template block<3, 3>(State::position, State::position);
+    sigma_velocity_mps_ = std::sqrt(std::max(1e-6, P.template block<3, 3>(State::velocity, State::velocity).trace() / 3));
     if (!integration_.restart(t, imu::bias_of(x)).ok()) (void)integration_.start(t, imu::bias_of(x), options_.preintegration);
     detector_.set_speed_hint(t, x.v_wb_mps.norm(), sigma_velocity_mps_);
-    if (P.block<3, 3>(State::gyro_bias, State::gyro_bias).trace() < 3e-6) detector_.set_gyro_bias(x.gyro_bias_b_radps);
+    if (P.template block<3, 3>(State::gyro_bias, State::gyro_bias).trace() < 3e-6) detector_.set_gyro_bias(x.gyro_bias_b_radps);
   }
 
   /// Attitude and biases. R_nw: axes of w to East-North-Up at the position.
-  void describe(const State& x, const Covariance& P, const Eigen::Matrix3d& R_nw, RtkSolution& out) const {
+  void describe(const State& x, const Covariance& P, const Matrix3& R_nw, RtkSolution& out) const {
     out.has_attitude = true;
     out.R_nb = R_nw * x.R_wb;
-    const Eigen::Matrix3d C = out.R_nb * P.topLeftCorner<3, 3>() * out.R_nb.transpose();
+    const Matrix3& R_nb = out.R_nb;
+    const Matrix3 C = R_nb * P.template topLeftCorner<3, 3>() * R_nb.transpose();
     out.attitude_sigma_rad = C.diagonal().cwiseMax(0).cwiseSqrt();
     out.accel_bias_b_mps2 = x.accel_bias_b_mps2, out.gyro_bias_b_radps = x.gyro_bias_b_radps;
   }
 
  private:
   /// The reading nearest to a time.
-  [[nodiscard]] Eigen::Vector3d gyro_at(GpsTime t) const {
-    Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
+  [[nodiscard]] Vector3 gyro_at(GpsTime t) const {
+    Vector3 gyro = Vector3::Zero();
     double nearest_s = 1e9;
     for (const imu::ImuSample& s : recent_) {
       const double away_s = std::abs(seconds_between(s.time, t));
@@ -243,7 +247,7 @@ class InertialMotion {
   }
   /// Ties a state at rest to the anchor. There must be none before: the prior would carry what integers said into the float.
   template <class Smoother>
-  void hold_place(Smoother& smoother, smoother::Key<State> key, GpsTime t, const Eigen::Vector3d& predicted_w_m) {
+  void hold_place(Smoother& smoother, smoother::Key<State> key, GpsTime t, const Vector3& predicted_w_m) {
     if (!anchor_.valid() || !smoother.find(anchor_)) {
       anchor_ = {};
       if (!is_float_) return;
@@ -269,8 +273,8 @@ class InertialMotion {
   bool keep_in_lane(Smoother& smoother, smoother::Key<State> key, GpsTime t) {
     const State& x = *smoother.find(key);
     const Antenna antenna = antenna_at(t);
-    const Eigen::Matrix3d& R_ew = earth_.frame.R_ew;
-    const Eigen::Vector3d p_w_m = antenna.position_w_m(x);
+    const Matrix3& R_ew = earth_.frame.R_ew;
+    const Vector3 p_w_m = antenna.position_w_m(x);
     if (has_lane_ && (p_w_m - lane_place_w_m_).norm() < options_.lane_way_m) return false;
     const imu::CentrelineMatch lane = imu::match_centreline(lines_, earth_.frame.to_ecef(p_w_m), R_ew * antenna.velocity_w_mps(x),
                                                             R_ew * position_covariance_m2_ * R_ew.transpose(), options_.lanes);
@@ -287,10 +291,10 @@ class InertialMotion {
   stationary::Detector detector_;
   StaticVector<imu::ImuSample, 32> recent_{};
   smoother::Key<stationary::PositionAnchor> anchor_{};  ///< of the present rest
-  Eigen::Matrix3d position_covariance_m2_{Eigen::Matrix3d::Identity()};
+  Matrix3 position_covariance_m2_{Matrix3::Identity()};
   double sigma_velocity_mps_{1};
   imu::Centrelines lines_{};
-  Eigen::Vector3d lane_place_w_m_{Eigen::Vector3d::Zero()};  ///< of the last state that a lane holds
+  Vector3 lane_place_w_m_{Vector3::Zero()};  ///< of the last state that a lane holds
   bool has_lane_{false};
   bool is_float_{true}, rest_cue_{false};
 };

@@ -45,6 +45,7 @@
 #include <searvins/gnss/ephemeris.hpp>
 #include <searvins/gnss/single_point_tracker.hpp>
 #include <searvins/gnss/undifferenced_epoch.hpp>
+#include <searvins/math/deferred.hpp>
 
 namespace searvins::estimator {
 
@@ -60,6 +61,10 @@ class RtkEstimator {
   using Motion = typename Config::Motion;
   using State = typename Motion::State;
   using StateCovariance = typename Motion::Covariance;
+  using Scalar = typename Problem::Scalar;
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+  using LocalFrame = math::Deferred<geodesy::LocalFrame, Config>;
 
   /// Settings of the robust policies are those of the forms themselves (their `loss`).
   explicit RtkEstimator(const RtkOptions& options = {}, const CodePhaseForm& code_phase = {}, const DopplerForm& doppler = {},
@@ -140,7 +145,7 @@ class RtkEstimator {
   }
 
   /// Starts from a known state (an alignment) in a frame; a window that is running is dropped.
-  void begin_at(const State& state, const StateCovariance& covariance, GpsTime time, const geodesy::LocalFrame& frame) {
+  void begin_at(const State& state, const StateCovariance& covariance, GpsTime time, const LocalFrame& frame) {
     restart();
     frame_ = frame;
     motion_.set_frame(frame);
@@ -170,13 +175,13 @@ class RtkEstimator {
   [[nodiscard]] const Smoother& smoother() const { return smoother_; }
   [[nodiscard]] const RtkOptions& options() const { return options_; }
   /// The local frame of the window: East-North-Up where it was started.
-  [[nodiscard]] const geodesy::LocalFrame& frame() const { return frame_; }
+  [[nodiscard]] const LocalFrame& frame() const { return frame_; }
 
   /// The smoothed estimate of the oldest epoch of the window: what is known `lag_s` later. Errors: no_data while there is
   /// no window.
   struct LaggedState {
     GpsTime time{};
-    Eigen::Vector3d position_e_m{Eigen::Vector3d::Zero()};
+    Vector3 position_e_m{Vector3::Zero()};
     SolutionStatus status{SolutionStatus::dr};
   };
   [[nodiscard]] Result<LaggedState> oldest() const {
@@ -205,7 +210,7 @@ class RtkEstimator {
   /// The epoch that the differencer remembers, and where the antenna was then.
   struct Compared {
     GpsTime time{};
-    Eigen::Vector3d position_e_m{Eigen::Vector3d::Zero()};
+    Vector3 position_e_m{Vector3::Zero()};
     bool is_estimated{false};
   };
   /// An integer constraint in the window.
@@ -289,7 +294,8 @@ class RtkEstimator {
     if (!tracked.ok()) return;  // the last prediction stands
     predicted_e_m_ = tracked->position_e_m;
     predicted_v_e_mps_ = tracked->velocity_e_mps;
-    predicted_sigma_m_ = std::max(2.0, 2 * std::sqrt(tracked->position_covariance_m2.trace()));
+    const Matrix3& covariance_m2 = tracked->position_covariance_m2;
+    predicted_sigma_m_ = std::max(2.0, 2 * std::sqrt(covariance_m2.trace()));
   }
 
   // ---- difference ------------------------------------------------------------------------------------------------------------------------
@@ -309,7 +315,7 @@ class RtkEstimator {
     if (!Motion::is_inertial || !is_predicted_ || !compared_.is_estimated) return std::nullopt;
     const double dt_s = seconds_between(compared_.time, out.time);
     const auto P = Motion::antenna_covariance(predicted_, predicted_covariance_, motion_.antenna_at(out.time));
-    const Eigen::Matrix3d velocity_covariance_e = frame_.R_ew * P.template bottomRightCorner<3, 3>() * frame_.R_ew.transpose();
+    const Matrix3 velocity_covariance_e = frame_.R_ew * P.template bottomRightCorner<3, 3>() * frame_.R_ew.transpose();
     return gnss::PredictedDisplacement{predicted_e_m_ - compared_.position_e_m, dt_s * dt_s * velocity_covariance_e};
   }
 
@@ -336,12 +342,12 @@ class RtkEstimator {
       set_from_tracker(*tracked, out);
     } else {
       out.position_e_m = predicted_e_m_, out.velocity_e_mps = predicted_v_e_mps_;
-      out.covariance_enu_m2 = Eigen::Matrix3d::Identity() * predicted_sigma_m_ * predicted_sigma_m_;
-      out.velocity_covariance_enu = Eigen::Matrix3d::Identity() * std::max(1.0, predicted_sigma_m_ * predicted_sigma_m_ / 100);
+      out.covariance_enu_m2 = Matrix3::Identity() * predicted_sigma_m_ * predicted_sigma_m_;
+      out.velocity_covariance_enu = Matrix3::Identity() * std::max(1.0, predicted_sigma_m_ * predicted_sigma_m_ / 100);
     }
   }
   static void set_from_tracker(const gnss::TrackedPosition& t, RtkSolution& out) {
-    const Eigen::Matrix3d R_ew = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(t.position_e_m));
+    const Matrix3 R_ew = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(t.position_e_m));
     out.position_e_m = t.position_e_m, out.velocity_e_mps = t.velocity_e_mps;
     out.covariance_enu_m2 = R_ew.transpose() * t.position_covariance_m2 * R_ew;
     out.velocity_covariance_enu = R_ew.transpose() * t.velocity_covariance_m2ps2 * R_ew;
@@ -355,9 +361,9 @@ class RtkEstimator {
     antenna_ = motion_.antenna_at(out.time);
     if (is_epoch) continuation_.begin_epoch();
     select_phases();
-    const Eigen::Vector3d start_e_m = snapshot_position();
+    const Vector3 start_e_m = snapshot_position();
     if (!window_running()) {
-      if (!Motion::is_inertial) frame_ = geodesy::LocalFrame::at(start_e_m);
+      if (!Motion::is_inertial) frame_ = LocalFrame::at(start_e_m);
       out.restarted = true;
     }
     const State start = motion_.placed(is_predicted_ ? predicted_ : State{}, antenna_, frame_.to_local(start_e_m), frame_.R_ew.transpose() * predicted_v_e_mps_);
@@ -492,7 +498,7 @@ class RtkEstimator {
   }
 
   /// Codes and continued phases of the epoch, for the start of Gauss-Newton.
-  [[nodiscard]] Eigen::Vector3d snapshot_position() {
+  [[nodiscard]] Vector3 snapshot_position() {
     snapshot_.rows.clear();
     snapshot_.predicted_e_m = predicted_e_m_;
     snapshot_.predicted_sigma_m = predicted_sigma_m_;
@@ -526,9 +532,9 @@ class RtkEstimator {
   /// Code innovation against the prediction: r = z_s - z_p - (rho_s - rho_p) with variance (u_s - u_p)' P (u_s - u_p) + sigma_s^2 + sigma_p^2.
   [[nodiscard]] bool passes_gate(int i, int pivot) const {
     const gnss::CorrectedSignal &s = epoch_.signals[at(i)], &p = epoch_.signals[at(pivot)];
-    const Eigen::Vector3d to_s = predicted_e_m_ - s.satellite_e_m, to_p = predicted_e_m_ - p.satellite_e_m;
+    const Vector3 to_s = predicted_e_m_ - s.satellite_e_m, to_p = predicted_e_m_ - p.satellite_e_m;
     const double r = s.code_m - p.code_m - (gnss::range_m(predicted_e_m_, s.satellite_e_m) - gnss::range_m(predicted_e_m_, p.satellite_e_m));
-    const Eigen::Vector3d j_w = frame_.R_ew.transpose() * (to_s / to_s.norm() - to_p / to_p.norm());
+    const Vector3 j_w = frame_.R_ew.transpose() * (to_s / to_s.norm() - to_p / to_p.norm());
     const double variance = j_w.dot(predicted_position_m2_ * j_w) + s.code_variance_m2 + p.code_variance_m2;
     return r * r <= options_.code_gate_sigmas * options_.code_gate_sigmas * variance;
   }
@@ -549,7 +555,7 @@ class RtkEstimator {
       if (!code_usable_[k]) phase_usable_[group.candidates[k]] = false;
   }
 
-  void add_group(int g, smoother::Key<State> state, const Eigen::Vector3d& start_e_m, RtkSolution& out) {
+  void add_group(int g, smoother::Key<State> state, const Vector3& start_e_m, RtkSolution& out) {
     const gnss::SignalGroup& group = epoch_.groups[at(g)];
     typename Problem::CodeFactor code;
     begin_batch(code, state, group.pivot);
@@ -628,7 +634,7 @@ class RtkEstimator {
 
   /// Level, in metres, from which the fresh ambiguities of a group are counted, so that their phases agree with the start position:
   /// lambda N_i = phase_i - range_i - level. From a state that goes on, else from the pivot's code.
-  [[nodiscard]] double phase_reference(const gnss::SignalGroup& group, int pivot, const Eigen::Vector3d& start_e_m) const {
+  [[nodiscard]] double phase_reference(const gnss::SignalGroup& group, int pivot, const Vector3& start_e_m) const {
     const auto level = [&](int i, double n_cycles) {
       const gnss::CorrectedSignal& s = epoch_.signals[at(i)];
       return s.phase_m - gnss::range_m(start_e_m, s.satellite_e_m) - s.wavelength_m * n_cycles;
@@ -649,7 +655,7 @@ class RtkEstimator {
   }
 
   /// The ambiguity state of a signal at this epoch: continued, walked or fresh.
-  [[nodiscard]] AmbiguityKey ambiguity_state(int i, int pivot, double reference_m, const Eigen::Vector3d& start_e_m, RtkSolution& out) {
+  [[nodiscard]] AmbiguityKey ambiguity_state(int i, int pivot, double reference_m, const Vector3& start_e_m, RtkSolution& out) {
     const gnss::CorrectedSignal& s = epoch_.signals[at(i)];
     const ambiguity::ArcId id = arc_of(s);
     ambiguity::Transition transition = continuation_.decide(id, s.continuity == gnss::Continuity::verified, pivot_id(pivot));
@@ -704,7 +710,7 @@ class RtkEstimator {
     if (!optimise(out)) return recover(out);
     out.status = status_of_rows(out);
     const bool have_float = collect_float(out);
-    if (!have_float) float_.Q_pp = held_.empty() ? Eigen::Matrix3d::Zero() : position_covariance();
+    if (!have_float) float_.Q_pp = held_.empty() ? Matrix3::Zero() : position_covariance();
     while (is_window_long(out)) marginalise_oldest();
     if (nodes_.empty()) return recover(out);
     forget_gone_integers();
@@ -767,8 +773,8 @@ class RtkEstimator {
     out.status = status_of_rows(out);
     set_antenna(nodes_.empty() ? predicted_ : *smoother_.find(nodes_.back().state), antenna_, out);
     const double sigma_m = std::max(5.0, predicted_sigma_m_);
-    out.covariance_enu_m2 = Eigen::Matrix3d::Identity() * sigma_m * sigma_m;
-    out.velocity_covariance_enu = Eigen::Matrix3d::Identity();
+    out.covariance_enu_m2 = Matrix3::Identity() * sigma_m * sigma_m;
+    out.velocity_covariance_enu = Matrix3::Identity();
     out.verdict = ambiguity::ResolutionVerdict::ill_conditioned;
     restart();
     doubt_m_ = sigma_m;
@@ -788,7 +794,7 @@ class RtkEstimator {
   }
 
   /// Covariance of the antenna's position in w, from the window as it was last optimised.
-  [[nodiscard]] Eigen::Matrix3d position_covariance() {
+  [[nodiscard]] Matrix3 position_covariance() {
     const auto covariance = smoother_.covariance(nodes_.back().state);
     const StateCovariance P = covariance.ok() ? *covariance : start_covariance();
     return Motion::antenna_covariance(*smoother_.find(nodes_.back().state), P, antenna_).template topLeftCorner<3, 3>();
@@ -811,18 +817,18 @@ class RtkEstimator {
     const auto cov = [&](int i, int j) { return j < 0 || i < 0 ? 0.0 : joint_[at(j) * at(n) + at(i)]; };
     float_.n = static_cast<int>(differences_.size());
     // Rotation from the window's axes to East-North-Up at the position is below 1e-5 over 60 m, and gates want no more.
-    Eigen::Matrix<double, 3, State::dof> J;  // of the antenna's position by the state
+    Eigen::Matrix<Scalar, 3, State::dof> J;  // of the antenna's position by the state
     (void)antenna_.position_w_m(*smoother_.find(nodes_.back().state), &J);
     StateCovariance P;
     for (int a = 0; a < State::dof; ++a)
       for (int b = 0; b < State::dof; ++b) P(a, b) = cov(a, b);
-    const Eigen::Matrix<double, 3, State::dof> JP = J.lazyProduct(P);
+    const Eigen::Matrix<Scalar, 3, State::dof> JP = J.lazyProduct(P);
     float_.Q_pp = JP.lazyProduct(J.transpose());
     for (int i = 0; i < float_.n; ++i) {
       const int ai = a_column_[at(i)], bi = b_column_[at(i)];
       const Difference& d = differences_[at(i)];
       float_.a_cycles[at(i)] = smoother_.find(d.a)->value - (d.b.valid() ? smoother_.find(d.b)->value : 0.0);
-      Eigen::Matrix<double, State::dof, 1> c;
+      Eigen::Matrix<Scalar, State::dof, 1> c;
       for (int axis = 0; axis < State::dof; ++axis) c[axis] = cov(axis, ai) - cov(axis, bi);
       float_.Q_pa[at(i)] = J.lazyProduct(c);
       for (int j = 0; j <= i; ++j) {
@@ -941,10 +947,15 @@ class RtkEstimator {
     out.velocity_e_mps = frame_.R_ew * antenna.velocity_w_mps(x);
   }
 
+  /// Axes of w to East-North-Up at a position.
+  [[nodiscard]] Matrix3 enu_from_local(const Vector3& position_e_m) const {
+    return geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(position_e_m)).transpose() * frame_.R_ew;
+  }
+
   /// Antenna, covariances and attitude of a state.
   void describe(const State& x, const StateCovariance& P, const typename Motion::Antenna& antenna, RtkSolution& out) const {
     set_antenna(x, antenna, out);
-    const Eigen::Matrix3d R = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(out.position_e_m)).transpose() * frame_.R_ew;
+    const Matrix3 R = enu_from_local(out.position_e_m);
     const auto C = Motion::antenna_covariance(x, P, antenna);
     out.covariance_enu_m2 = R * C.template topLeftCorner<3, 3>() * R.transpose();
     out.velocity_covariance_enu = R * C.template bottomRightCorner<3, 3>() * R.transpose();
@@ -966,7 +977,7 @@ class RtkEstimator {
 
   /// See the file comment. The float is that of this epoch, with the integers switched off; frames go on with the last epoch's.
   void doubt_integers(RtkSolution& out) {
-    const Eigen::Matrix3d R = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(out.position_e_m)).transpose() * frame_.R_ew;
+    const Matrix3 R = enu_from_local(out.position_e_m);
     if (out.source != SolutionSource::camera) doubt_enu_m2_ = (1 - integer_trust_) * (R * float_.Q_pp * R.transpose() - out.covariance_enu_m2);
     out.covariance_enu_m2 += doubt_enu_m2_;
   }
@@ -1016,7 +1027,7 @@ class RtkEstimator {
   ambiguity::Resolver<kPhases> resolver_{};
   ambiguity::FloatAmbiguities<kPhases> float_{};
   ambiguity::ResolutionOutcome<kPhases> outcome_{};
-  geodesy::LocalFrame frame_{};
+  LocalFrame frame_{};
   StaticVector<Node, static_cast<std::size_t>(Cap::states)> nodes_{};
   StaticVector<Held, static_cast<std::size_t>(Cap::fixes)> held_{};
   StaticVector<Difference, kPhasesSize> differences_{};
@@ -1028,9 +1039,9 @@ class RtkEstimator {
   std::array<int, kPhasesSize> a_column_{}, b_column_{};
   std::array<double, (2 * kPhasesSize + State::dof) * (2 * kPhasesSize + State::dof)> joint_{};
   Snapshot<2 * gnss::kMaxCorrectedSignals> snapshot_{};
-  Eigen::Vector3d predicted_e_m_{Eigen::Vector3d::Zero()}, predicted_v_e_mps_{Eigen::Vector3d::Zero()};
+  Vector3 predicted_e_m_{Vector3::Zero()}, predicted_v_e_mps_{Vector3::Zero()};
   double predicted_sigma_m_{100}, clock_offset_s_{0};
-  Eigen::Matrix3d predicted_position_m2_{Eigen::Matrix3d::Identity()};  ///< of the predicted antenna, in w
+  Matrix3 predicted_position_m2_{Matrix3::Identity()};  ///< of the predicted antenna, in w
   Compared compared_{};
   State predicted_{}, last_state_{};  ///< of the epoch at hand by the motion alone; the newest estimate
   StateCovariance predicted_covariance_{StateCovariance::Identity()}, last_covariance_{StateCovariance::Identity()};
@@ -1039,7 +1050,7 @@ class RtkEstimator {
   bool is_predicted_{false}, has_state_{false};
   bool is_undifferenced_{false};  ///< the codes of the epoch at hand are the rover's alone
   double integer_trust_{1};  ///< probability that the integers accepted last are right
-  Eigen::Matrix3d doubt_enu_m2_{Eigen::Matrix3d::Zero()};  ///< what that adds to the covariance of the position
+  Matrix3 doubt_enu_m2_{Matrix3::Zero()};  ///< what that adds to the covariance of the position
   GpsTime last_epoch_time_{};  ///< of the last state with codes in this window
   bool has_epoch_{false}, stationary_{false};
   double doubt_m_{0};  ///< sigma that the next window's start is widened by

@@ -22,6 +22,7 @@
 #include <searvins/core/static_vector.hpp>
 #include <searvins/gnss/range.hpp>
 #include <searvins/math/block_cholesky.hpp>
+#include <searvins/math/deferred.hpp>
 
 namespace searvins::estimator {
 
@@ -36,13 +37,17 @@ struct SnapshotRow {
 /// Rows of one epoch and the prediction they start from.
 template <std::size_t MaxRows>
 struct Snapshot {
+  using Scalar = math::DeferredFor<double, MaxRows>;
+  using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+
   StaticVector<SnapshotRow, MaxRows> rows{};
-  Eigen::Vector3d predicted_e_m{Eigen::Vector3d::Zero()};
+  Vector3 predicted_e_m{Vector3::Zero()};
   double predicted_sigma_m{100};
 
   /// The robust position, ECEF; the prediction when the rows do not determine one.
-  [[nodiscard]] Eigen::Vector3d solve() const {
-    Eigen::Vector3d p = predicted_e_m;
+  [[nodiscard]] Vector3 solve() const {
+    Vector3 p = predicted_e_m;
     double s = largest_square(p);
     while (true) {
       for (int i = 0; i < 2; ++i)
@@ -55,7 +60,7 @@ struct Snapshot {
 
  private:
   struct GroupMeans {
-    Eigen::Vector3d u{Eigen::Vector3d::Zero()};
+    Vector3 u{Vector3::Zero()};
     double r{0}, k{0};
   };
 
@@ -71,14 +76,14 @@ struct Snapshot {
   }
 
   /// The middle residual of a group: its common part, whatever up to half of the rows say.
-  [[nodiscard]] double median_residual(const Eigen::Vector3d& p, std::size_t first, std::size_t last) const {
+  [[nodiscard]] double median_residual(const Vector3& p, std::size_t first, std::size_t last) const {
     StaticVector<double, MaxRows> r;
     for (std::size_t i = first; i < last; ++i) (void)r.push_back(rows[i].z_m - gnss::range_m(p, rows[i].satellite_e_m));
     std::nth_element(r.begin(), r.begin() + static_cast<std::ptrdiff_t>(r.size() / 2), r.end());
     return r[r.size() / 2];
   }
 
-  [[nodiscard]] double largest_square(const Eigen::Vector3d& p) const {
+  [[nodiscard]] double largest_square(const Vector3& p) const {
     double largest = 4;
     for_each_group([&](std::size_t first, std::size_t last) {
       const double common = median_residual(p, first, last);
@@ -90,10 +95,10 @@ struct Snapshot {
     return largest;
   }
 
-  [[nodiscard]] bool step(Eigen::Vector3d& p, double s) const {
+  [[nodiscard]] bool step(Vector3& p, double s) const {
     const double information = 1 / (predicted_sigma_m * predicted_sigma_m);
-    Eigen::Matrix3d A = Eigen::Matrix3d::Identity() * information;
-    Eigen::Vector3d b = information * (predicted_e_m - p);
+    Matrix3 A = Matrix3::Identity() * information;
+    Vector3 b = information * (predicted_e_m - p);
     for_each_group([&](std::size_t first, std::size_t last) {
       double common = median_residual(p, first, last);
       GroupMeans mean;
@@ -105,14 +110,14 @@ struct Snapshot {
         if (pass == 0) common = mean.r;
       }
       for (std::size_t i = first; i < last; ++i) {
-        Eigen::Vector3d u;
+        Vector3 u;
         const double r = rows[i].z_m - gnss::range_m(p, rows[i].satellite_e_m, &u);
         const double k = weight(rows[i], r - common, s);
         A += k * (u - mean.u) * (u - mean.u).transpose();
         b += k * (r - mean.r) * (u - mean.u);
       }
     });
-    const Eigen::Vector3d reference = A.diagonal();
+    const Vector3 reference = A.diagonal();
     if (!math::partial_cholesky(A.data(), 3, 3, 3, reference.data()).ok()) return false;
     math::solve_lower(A.data(), 3, 3, b.data());
     math::solve_lower_transposed(A.data(), 3, 3, b.data());
@@ -124,8 +129,8 @@ struct Snapshot {
     const double shape = s / (s + r * r / row.variance_m2);
     return shape * shape / row.variance_m2;
   }
-  static void accumulate(const SnapshotRow& row, const Eigen::Vector3d& p, double s, double common, GroupMeans& mean) {
-    Eigen::Vector3d u;
+  static void accumulate(const SnapshotRow& row, const Vector3& p, double s, double common, GroupMeans& mean) {
+    Vector3 u;
     const double r = row.z_m - gnss::range_m(p, row.satellite_e_m, &u);
     const double k = weight(row, r - common, s);
     mean.u += k * u, mean.r += k * r, mean.k += k;

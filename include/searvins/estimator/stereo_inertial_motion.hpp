@@ -87,6 +87,8 @@ class StereoInertialMotion : public InertialMotion<Earth> {
  public:
   using Base = InertialMotion<Earth>;
   using State = typename Base::State;
+  using Vector3 = typename Base::Vector3;
+  using Matrix3 = typename Base::Matrix3;
   using Options = StereoInertialOptions;
   using Frame = vision::StereoFrame<N>;
   using Camera = CameraType;
@@ -163,8 +165,8 @@ class StereoInertialMotion : public InertialMotion<Earth> {
 
  private:
   struct Pose {
-    Eigen::Matrix3d R_wc{Eigen::Matrix3d::Identity()};
-    Eigen::Vector3d p_wc_m{Eigen::Vector3d::Zero()};
+    Matrix3 R_wc{Matrix3::Identity()};
+    Vector3 p_wc_m{Vector3::Zero()};
   };
   /// The state that the admission's reference frame belongs to, and the camera's place in its body at that frame.
   struct Reference {
@@ -188,7 +190,7 @@ class StereoInertialMotion : public InertialMotion<Earth> {
 
   [[nodiscard]] View view_of(const State& x, double late_s, GpsTime t) const {
     View view;
-    view.motion = {late_s, x.v_wb_mps, Eigen::Vector3d::Zero()};
+    view.motion = {late_s, x.v_wb_mps, Vector3::Zero()};
     if (Camera::calibrates || late_s != 0) view.motion.rate_b_radps = this->antenna_at(t).gyro_b_radps - x.gyro_bias_b_radps;
     view.camera = camera_.placed(stereo_.camera, x.R_wb, view.motion);
     view.pose = {x.R_wb * view.camera.R_bc, x.p_wb_m + x.R_wb * view.camera.p_bc_m};
@@ -200,8 +202,8 @@ class StereoInertialMotion : public InertialMotion<Earth> {
   [[nodiscard]] std::optional<vision::PredictedMotion> predicted_motion(const Smoother& smoother, const Pose& now) const {
     const State* before = reference_.key.valid() ? smoother.find(reference_.key) : nullptr;
     if (!before) return std::nullopt;
-    const Eigen::Matrix3d R_wc = before->R_wb * reference_.camera.R_bc;
-    const Eigen::Vector3d p_wc_m = before->p_wb_m + before->R_wb * reference_.camera.p_bc_m;
+    const Matrix3 R_wc = before->R_wb * reference_.camera.R_bc;
+    const Vector3 p_wc_m = before->p_wb_m + before->R_wb * reference_.camera.p_bc_m;
     vision::PredictedMotion motion;
     motion.motion = {R_wc.transpose() * now.R_wc, R_wc.transpose() * (now.p_wc_m - p_wc_m)};
     return motion;
@@ -246,7 +248,7 @@ class StereoInertialMotion : public InertialMotion<Earth> {
   template <class Smoother>
   Seen* begin_landmark(Smoother& smoother, smoother::Key<State> key, GpsTime t, const View& view, const vision::AdmittedObservation& o) {
     if (seen_.full()) return nullptr;
-    const Eigen::Vector3d p_w_m = view.pose.p_wc_m + view.pose.R_wc * vision::point_at(view.camera, o.pixel_px);  // admission has looked at its range
+    const Vector3 p_w_m = view.pose.p_wc_m + view.pose.R_wc * vision::point_at(view.camera, o.pixel_px);  // admission has looked at its range
     const auto landmark = smoother.add_variable(vision::Landmark{p_w_m}, t);
     if (!landmark.ok()) return nullptr;
     const auto prior = vision::LandmarkPriorFactor::make(*landmark, p_w_m, stereo_.landmark_prior_sigma_m);
