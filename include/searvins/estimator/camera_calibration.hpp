@@ -64,8 +64,6 @@ class BasicKnownCamera {
   template <class Smoother>
   void remember(Smoother&) {}
 };
-
-/// What this library computes with.
 using KnownCamera = BasicKnownCamera<double>;
 
 /// See the file comment.
@@ -73,13 +71,14 @@ template <class Scalar>
 class BasicCalibratedCamera {
   using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
   using Matrix4 = Eigen::Matrix<Scalar, 4, 4>;
+  using Estimate = math::Deferred<vision::CameraCorrectionEstimate, Scalar>;
+  using PlainFactor = math::Deferred<vision::StereoFactor<>, Scalar>;  ///< by the camera as it was calibrated
   static constexpr int kCorrections = 8;  ///< in the window
   static constexpr double kDoubt = 3;     ///< sigmas of what a lost window said
 
  public:
   static constexpr bool calibrates = true;
   using Camera = vision::StereoCamera<Scalar>;
-  using Seen = math::Deferred<vision::StereoFactor<>, Scalar>;
   using Factor = math::Deferred<vision::CalibratingStereoFactor<>, Scalar>;
   template <class Cap>
   using Variables = smoother::Types<smoother::Capacity<vision::CameraCorrection, kCorrections>>;
@@ -92,7 +91,7 @@ class BasicCalibratedCamera {
   }
 
   /// What is known: the last solution's, or the prior.
-  [[nodiscard]] const vision::CameraCorrectionEstimate& estimate() const { return estimate_; }
+  [[nodiscard]] const Estimate& estimate() const { return estimate_; }
 
   template <class Smoother>
   void begin_frame(Smoother& smoother, GpsTime time) {
@@ -112,7 +111,7 @@ class BasicCalibratedCamera {
   [[nodiscard]] Result<Factor> observation(smoother::Key<imu::NavigationState> state, smoother::Key<vision::Landmark> landmark,
                                            const Camera& nominal, const Camera&, const vision::FrameMotion& motion, const vision::StereoPixel<Scalar>& pixel,
                                            const Matrix3& covariance_px2, vision::Eyes eyes = vision::Eyes::both) const {
-    const auto seen = Seen::make(state, landmark, nominal, pixel, covariance_px2, 1, {}, eyes);
+    const auto seen = PlainFactor::make(state, landmark, nominal, pixel, covariance_px2, 1, {}, eyes);
     return seen.ok() ? Factor::make(*seen, key_, motion) : seen.status();
   }
   template <class Smoother>
@@ -141,13 +140,11 @@ class BasicCalibratedCamera {
   }
 
   vision::CameraCorrectionOptions options_;
-  vision::CameraCorrectionEstimate estimate_{};
+  Estimate estimate_{};
   smoother::Key<vision::CameraCorrection> key_{};
   GpsTime begun_{}, remembered_{};
   bool was_used_{false};
 };
-
-/// What this library computes with.
 using CalibratedCamera = BasicCalibratedCamera<double>;
 
 }  // namespace searvins::estimator

@@ -77,8 +77,6 @@ class BasicCameraPredictor {
   Vector3 arm_b_m_;
   std::optional<Place> before_;
 };
-
-/// What this library computes with.
 using CameraPredictor = BasicCameraPredictor<double>;
 
 }  // namespace searvins::estimator

@@ -166,7 +166,9 @@ class Estimator {
   }
   /// A position of the antenna from another program or receiver (loose coupling), in time order. Errors: duplicate, out_of_order, capacity_exceeded.
   Status add_position(const imu::PositionFix& fix) {
-    if (!fix.position_e_m.allFinite() || !fix.covariance_e_m2.allFinite()) return failure(StatusCode::non_finite, "position or its covariance is not finite");
+    const Vector3& position_e_m = fix.position_e_m;
+    const Matrix3& covariance_e_m2 = fix.covariance_e_m2;
+    if (!position_e_m.allFinite() || !covariance_e_m2.allFinite()) return failure(StatusCode::non_finite, "position or its covariance is not finite");
     if (has_rover_ && fix.time <= newest_rover_) return failure(fix.time == newest_rover_ ? StatusCode::duplicate : StatusCode::out_of_order, "position not after the last one");
     if (is_answered(fix.time)) return failure(StatusCode::out_of_order, "position later than the declared latency");
     if (!positions_.push(fix)) return failure(StatusCode::capacity_exceeded, "positions wait for next(): take solutions more often");
@@ -242,6 +244,9 @@ class Estimator {
   [[nodiscard]] const Free& gnss_only() const { return free_; }
 
  private:
+  using Initializer = math::Deferred<imu::Initializer, Motion>;
+  using Detector = math::Deferred<stationary::Detector, Motion>;
+
   struct NoFrame {};
   struct NoFrames {
     [[nodiscard]] static bool empty() { return true; }
@@ -454,15 +459,15 @@ class Estimator {
 
   void lose_alignment() {
     aligned_ = false;
-    initializer_ = imu::Initializer{initializer_settings(options_)};
-    detector_ = stationary::Detector{options_.inertial.preintegration.noise, options_.inertial.detector};
+    initializer_ = Initializer{initializer_settings(options_)};
+    detector_ = Detector{options_.inertial.preintegration.noise, options_.inertial.detector};
   }
 
   Options options_;
   Free free_;
   Bound bound_;
-  imu::Initializer initializer_;
-  stationary::Detector detector_;
+  Initializer initializer_;
+  Detector detector_;
   LocalFrame frame_{};
   imu::Preintegration<double, 4096> ahead_{};  ///< from the newest state to the newest reading
   RingBuffer<imu::ImuSample, 8192> samples_{};

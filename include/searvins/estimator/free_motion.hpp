@@ -90,8 +90,6 @@ class BasicFreeMotion {
  private:
   RtkOptions options_;
 };
-
-/// What this library computes with.
 using FreeMotion = BasicFreeMotion<double>;
 
 }  // namespace searvins::estimator

@@ -81,6 +81,7 @@ class InertialMotion {
   using Antenna = math::Deferred<imu::LeverArm, Earth>;
   using Options = InertialOptions;
   using Covariance = math::Deferred<imu::NavigationCovariance, Earth>;
+  using Detector = math::Deferred<stationary::Detector, Earth>;
   using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
   using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
   template <class Cap>
@@ -99,7 +100,7 @@ class InertialMotion {
   void set_centrelines(imu::Centrelines lines) { lines_ = lines, has_lane_ = false; }
   [[nodiscard]] const Options& options() const { return options_; }
   [[nodiscard]] const Earth& earth() const { return earth_; }
-  [[nodiscard]] const stationary::Detector& detector() const { return detector_; }
+  [[nodiscard]] const Detector& detector() const { return detector_; }
 
   /// The next reading. Errors: those of imu::Preintegration::push; nothing was changed then.
   Status add_sample(const imu::ImuSample& sample) {
@@ -288,7 +289,7 @@ class InertialMotion {
   Options options_;
   Earth earth_{};
   imu::Preintegration<double, SampleCapacity> integration_{};
-  stationary::Detector detector_;
+  Detector detector_;
   StaticVector<imu::ImuSample, 32> recent_{};
   smoother::Key<stationary::PositionAnchor> anchor_{};  ///< of the present rest
   Matrix3 position_covariance_m2_{Matrix3::Identity()};

@@ -1015,7 +1015,7 @@ class RtkEstimator {
   CodePhaseForm code_phase_form_;
   DopplerForm doppler_form_;
   Motion motion_;
-  gnss::SinglePointTracker tracker_;
+  math::Deferred<gnss::SinglePointTracker, Config> tracker_;
   gnss::EphemerisStore<Cap::ephemerides> ephemerides_{};
   gnss::BaseBuffer<Cap::base_epochs> base_{};
   gnss::Differencer differencer_{};

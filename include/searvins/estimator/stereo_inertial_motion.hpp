@@ -30,6 +30,7 @@
 #include <searvins/core/time.hpp>
 #include <searvins/estimator/camera_calibration.hpp>
 #include <searvins/estimator/inertial_motion.hpp>
+#include <searvins/math/deferred.hpp>
 #include <searvins/math/quantiles.hpp>
 #include <searvins/vision/admission.hpp>
 #include <searvins/vision/calibrating_stereo_factor.hpp>
@@ -164,6 +165,8 @@ class StereoInertialMotion : public InertialMotion<Earth> {
   }
 
  private:
+  using PredictedMotion = math::Deferred<vision::PredictedMotion, Earth>;
+
   struct Pose {
     Matrix3 R_wc{Matrix3::Identity()};
     Vector3 p_wc_m{Vector3::Zero()};
@@ -199,12 +202,12 @@ class StereoInertialMotion : public InertialMotion<Earth> {
 
   /// The camera's motion since the reference frame by the states of the window; nothing when that state is gone.
   template <class Smoother>
-  [[nodiscard]] std::optional<vision::PredictedMotion> predicted_motion(const Smoother& smoother, const Pose& now) const {
+  [[nodiscard]] std::optional<PredictedMotion> predicted_motion(const Smoother& smoother, const Pose& now) const {
     const State* before = reference_.key.valid() ? smoother.find(reference_.key) : nullptr;
     if (!before) return std::nullopt;
     const Matrix3 R_wc = before->R_wb * reference_.camera.R_bc;
     const Vector3 p_wc_m = before->p_wb_m + before->R_wb * reference_.camera.p_bc_m;
-    vision::PredictedMotion motion;
+    PredictedMotion motion;
     motion.motion = {R_wc.transpose() * now.R_wc, R_wc.transpose() * (now.p_wc_m - p_wc_m)};
     return motion;
   }
