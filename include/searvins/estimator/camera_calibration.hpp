@@ -31,7 +31,7 @@
 
 namespace searvins::estimator {
 
-/// See the file comment.
+/// See the file comment. Scalar: double, as that of the states.
 template <class Scalar>
 class BasicKnownCamera {
   using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
@@ -66,7 +66,7 @@ class BasicKnownCamera {
 };
 using KnownCamera = BasicKnownCamera<double>;
 
-/// See the file comment.
+/// See the file comment. Scalar: double, as that of the states.
 template <class Scalar>
 class BasicCalibratedCamera {
   using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;

@@ -28,7 +28,7 @@
 
 namespace searvins::estimator {
 
-/// See the file comment. Ask once a frame that the frontend is offered, in order of time.
+/// See the file comment. Ask once a frame that the frontend is offered, in order of time. Scalar: double, as that of the solutions.
 template <class Scalar>
 class BasicCameraPredictor {
  public:

@@ -22,7 +22,7 @@
 
 namespace searvins::estimator {
 
-/// See the file comment.
+/// See the file comment. Scalar: double, as that of its states.
 template <class Scalar>
 class BasicFreeMotion {
  public:
