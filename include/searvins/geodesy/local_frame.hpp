@@ -37,7 +37,8 @@ struct AzimuthElevation {
 
 /// Where `target_e_m` appears from `position_e_m`, in the local axes of the position.
 template <class Scalar = double>
-[[nodiscard]] AzimuthElevation azimuth_elevation(const math::Vector3<Scalar>& position_e_m, const math::Vector3<Scalar>& target_e_m) {
+[[nodiscard]] inline AzimuthElevation azimuth_elevation(const math::Vector3<Scalar>& position_e_m,
+                                                        const math::Vector3<Scalar>& target_e_m) {
   const math::Vector3<Scalar> enu =
       ecef_from_enu<Scalar>(geodetic_from_ecef<Scalar>(position_e_m)).transpose() * (target_e_m - position_e_m);
   return {std::atan2(enu.x(), enu.y()), std::atan2(enu.z(), std::hypot(enu.x(), enu.y()))};
@@ -45,7 +46,7 @@ template <class Scalar = double>
 
 /// Gravity (gravitation plus centrifugal) at an ECEF position, in ECEF, m/s^2: normal gravity along the ellipsoidal normal.
 template <class Scalar = double>
-[[nodiscard]] math::Vector3<Scalar> gravity_e_mps2(const math::Vector3<Scalar>& p_e_m) {
+[[nodiscard]] inline math::Vector3<Scalar> gravity_e_mps2(const math::Vector3<Scalar>& p_e_m) {
   const Geodetic g = geodetic_from_ecef<Scalar>(p_e_m);
   return -normal_gravity_mps2(g.lat_rad, g.height_m) * ecef_from_enu<Scalar>(g).col(2);
 }

@@ -30,7 +30,7 @@ struct Geodetic {
 
 /// ECEF position of a geodetic one, metres.
 template <class Scalar = double>
-[[nodiscard]] math::Vector3<Scalar> ecef_from_geodetic(const Geodetic& g) {
+[[nodiscard]] inline math::Vector3<Scalar> ecef_from_geodetic(const Geodetic& g) {
   const double s = std::sin(g.lat_rad), c = std::cos(g.lat_rad);
   const double n = kSemiMajorAxisM / std::sqrt(1.0 - kEccentricitySquared * s * s);
   return {(n + g.height_m) * c * std::cos(g.lon_rad), (n + g.height_m) * c * std::sin(g.lon_rad),
@@ -41,7 +41,7 @@ template <class Scalar = double>
 /// 15 nm at 50,000 km) from 6000 km below the ellipsoid upwards. Within 43 km of the centre of the Earth latitude is not unique; the
 /// centre itself gives latitude 0. On the axis longitude is 0.
 template <class Scalar = double>
-[[nodiscard]] Geodetic geodetic_from_ecef(const math::Vector3<Scalar>& p_e_m) {
+[[nodiscard]] inline Geodetic geodetic_from_ecef(const math::Vector3<Scalar>& p_e_m) {
   const auto x = static_cast<double>(p_e_m.x()), y = static_cast<double>(p_e_m.y()), z = static_cast<double>(p_e_m.z());
   const double rho = std::hypot(x, y);
   Geodetic g;
@@ -65,7 +65,7 @@ template <class Scalar = double>
 
 /// R_ew: columns are the east, north and up axes at a geodetic position, in ECEF.
 template <class Scalar = double>
-[[nodiscard]] math::Matrix3<Scalar> ecef_from_enu(const Geodetic& g) {
+[[nodiscard]] inline math::Matrix3<Scalar> ecef_from_enu(const Geodetic& g) {
   const double sp = std::sin(g.lat_rad), cp = std::cos(g.lat_rad), sl = std::sin(g.lon_rad), cl = std::cos(g.lon_rad);
   math::Matrix3<Scalar> R_ew;
   R_ew << -sl, -sp * cl, cp * cl,  //

@@ -117,15 +117,15 @@ template <class Scalar, class Weight>
 }
 
 template <class Scalar>
-[[nodiscard]] double standardised(const BasicDopplerRow<Scalar>& r, const Eigen::Matrix<Scalar, 4, 1>& x) {
+[[nodiscard]] inline double standardised(const BasicDopplerRow<Scalar>& r, const Eigen::Matrix<Scalar, 4, 1>& x) {
   return (r.rate_mps - r.direction.dot(x)) / r.sigma_mps;
 }
 
 /// Graduated Geman-McClure weights from the plain solution down to two sigma, one constellation (kConstellations: none) left out while the
 /// scale is coarse. Returns the robust cost, infinite when the geometry fails.
 template <class Scalar>
-[[nodiscard]] double descend_doppler(const BasicDopplerVelocity<Scalar>& d, const VelocityPrior& prior, std::size_t without,
-                                     Eigen::Matrix<Scalar, 4, 1>& x) {
+[[nodiscard]] inline double descend_doppler(const BasicDopplerVelocity<Scalar>& d, const VelocityPrior& prior, std::size_t without,
+                                            Eigen::Matrix<Scalar, 4, 1>& x) {
   constexpr double failed = std::numeric_limits<double>::infinity(), final_scale = 2;
   const auto left_out = [&](const auto& r) { return static_cast<std::size_t>(r.satellite.constellation) == without; };
   if (!solve_doppler(
@@ -154,7 +154,8 @@ template <class Scalar>
 
 /// The descent of least cost: with all satellites, or with a constellation left out at first.
 template <class Scalar>
-[[nodiscard]] bool best_doppler(const BasicDopplerVelocity<Scalar>& d, const VelocityPrior& prior, Eigen::Matrix<Scalar, 4, 1>& best) {
+[[nodiscard]] inline bool best_doppler(const BasicDopplerVelocity<Scalar>& d, const VelocityPrior& prior,
+                                       Eigen::Matrix<Scalar, 4, 1>& best) {
   double best_cost = std::numeric_limits<double>::infinity();
   for (std::size_t without = 0; without <= kConstellations; ++without) {
     Eigen::Matrix<Scalar, 4, 1> x;
@@ -166,8 +167,8 @@ template <class Scalar>
 
 /// Excludes rows until the chi-square test passes or there is no redundancy left; x and covariance are of what is left.
 template <class Scalar>
-[[nodiscard]] Status exclude_doppler_outliers(const DopplerOptions& options, const VelocityPrior& prior, BasicDopplerVelocity<Scalar>& d,
-                                              Eigen::Matrix<Scalar, 4, 1>& x) {
+[[nodiscard]] inline Status exclude_doppler_outliers(const DopplerOptions& options, const VelocityPrior& prior,
+                                                     BasicDopplerVelocity<Scalar>& d, Eigen::Matrix<Scalar, 4, 1>& x) {
   for (auto& r : d.rows) r.used = std::abs(standardised(r, x)) <= options.outlier_sigmas;
   for (;;) {
     const int used = static_cast<int>(std::count_if(d.rows.begin(), d.rows.end(), [](const auto& r) { return r.used; }));

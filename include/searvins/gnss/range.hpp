@@ -29,7 +29,7 @@ namespace searvins::gnss {
 
 /// Coordinates, in the ECEF axes `flight_s` later, of a point or a velocity given in ECEF axes: Rz(omega_e flight_s) v.
 template <class Scalar = double>
-[[nodiscard]] math::Vector3<Scalar> in_axes_after(const math::Vector3<Scalar>& v_e, double flight_s) {
+[[nodiscard]] inline math::Vector3<Scalar> in_axes_after(const math::Vector3<Scalar>& v_e, double flight_s) {
   const double theta = geodesy::kEarthRateRadps * flight_s, c = std::cos(theta), s = std::sin(theta);
   return {c * v_e.x() + s * v_e.y(), c * v_e.y() - s * v_e.x(), v_e.z()};
 }
@@ -37,8 +37,8 @@ template <class Scalar = double>
 /// Range in metres from the satellite (ECEF at transmission) to the receiver (ECEF at reception). Optionally d range / d p.
 /// The two points must differ.
 template <class Scalar = double>
-[[nodiscard]] double range_m(const math::Vector3<Scalar>& p_e_m, const math::Vector3<Scalar>& satellite_e_m,
-                             math::Vector3<Scalar>* d_range_d_p = nullptr) {
+[[nodiscard]] inline double range_m(const math::Vector3<Scalar>& p_e_m, const math::Vector3<Scalar>& satellite_e_m,
+                                    math::Vector3<Scalar>* d_range_d_p = nullptr) {
   constexpr double k = geodesy::kEarthRateRadps / kSpeedOfLightMps;
   const math::Vector3<Scalar> line = p_e_m - satellite_e_m;
   const double distance_m = line.norm();
@@ -48,8 +48,8 @@ template <class Scalar = double>
 
 /// Unit vector from the satellite to the receiver, in ECEF axes at reception.
 template <class Scalar = double>
-[[nodiscard]] math::Vector3<Scalar> direction_from_satellite(const math::Vector3<Scalar>& p_e_m,
-                                                             const math::Vector3<Scalar>& satellite_e_m) {
+[[nodiscard]] inline math::Vector3<Scalar> direction_from_satellite(const math::Vector3<Scalar>& p_e_m,
+                                                                    const math::Vector3<Scalar>& satellite_e_m) {
   const math::Vector3<Scalar> rotated_e_m = in_axes_after<Scalar>(satellite_e_m, (p_e_m - satellite_e_m).norm() / kSpeedOfLightMps);
   return (p_e_m - rotated_e_m).normalized();
 }
@@ -57,9 +57,9 @@ template <class Scalar = double>
 /// Range rate in m/s, positive when the satellite recedes, clocks excluded. Velocities are relative to ECEF: the receiver's at reception,
 /// the satellite's at transmission. Optionally d rate / d v (receiver velocity).
 template <class Scalar = double>
-[[nodiscard]] double range_rate_mps(const math::Vector3<Scalar>& p_e_m, const math::Vector3<Scalar>& v_e_mps,
-                                    const math::Vector3<Scalar>& satellite_e_m, const math::Vector3<Scalar>& satellite_v_e_mps,
-                                    math::Vector3<Scalar>* d_rate_d_v = nullptr) {
+[[nodiscard]] inline double range_rate_mps(const math::Vector3<Scalar>& p_e_m, const math::Vector3<Scalar>& v_e_mps,
+                                           const math::Vector3<Scalar>& satellite_e_m, const math::Vector3<Scalar>& satellite_v_e_mps,
+                                           math::Vector3<Scalar>* d_rate_d_v = nullptr) {
   const double flight_s = (p_e_m - satellite_e_m).norm() / kSpeedOfLightMps;
   const math::Vector3<Scalar> S = in_axes_after<Scalar>(satellite_e_m, flight_s), u = (p_e_m - S).normalized();
   const double toward_mps = u.dot(in_axes_after<Scalar>(satellite_v_e_mps, flight_s));

@@ -92,7 +92,7 @@ struct OrbitalPoint {
 };
 
 template <class Scalar>
-void to_node_frame(const OrbitalPoint& o, Eigen::Matrix<Scalar, 3, 1>& p, Eigen::Matrix<Scalar, 3, 1>& v) {
+inline void to_node_frame(const OrbitalPoint& o, Eigen::Matrix<Scalar, 3, 1>& p, Eigen::Matrix<Scalar, 3, 1>& v) {
   const double cn = std::cos(o.node), sn = std::sin(o.node), ci = std::cos(o.inclination), si = std::sin(o.inclination);
   const double across = o.y * ci, across_rate = o.y_rate * ci - o.y * si * o.inclination_rate;
   p = {o.x * cn - across * sn, o.x * sn + across * cn, o.y * si};
@@ -102,7 +102,8 @@ void to_node_frame(const OrbitalPoint& o, Eigen::Matrix<Scalar, 3, 1>& p, Eigen:
 
 /// From the tilted, non-rotating frame of BeiDou's geostationary orbits to ECEF at t = toe + tk.
 template <class Scalar>
-void geostationary_to_ecef(double turn_rad, double earth_rate_radps, Eigen::Matrix<Scalar, 3, 1>& p, Eigen::Matrix<Scalar, 3, 1>& v) {
+inline void geostationary_to_ecef(double turn_rad, double earth_rate_radps, Eigen::Matrix<Scalar, 3, 1>& p,
+                                  Eigen::Matrix<Scalar, 3, 1>& v) {
   using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
   constexpr double tilt = -5.0 * std::numbers::pi / 180.0;
   const double ct = std::cos(tilt), st = std::sin(tilt), c = std::cos(turn_rad), s = std::sin(turn_rad);
@@ -123,7 +124,7 @@ inline constexpr double kUnknownAccuracyM = 3.0;
 /// Errors: invalid_argument (orbit outside sqrt(a) 4000..8000, eccentricity 0..0.5,
 /// clock over 1 s off), non_finite (a field is not finite).
 template <class Scalar = double>
-[[nodiscard]] Result<SatelliteState> satellite_state(const Ephemeris& e, GpsTime t) {
+[[nodiscard]] inline Result<SatelliteState> satellite_state(const Ephemeris& e, GpsTime t) {
   if (!(e.sqrt_a > 4000 && e.sqrt_a < 8000))
     return failure(StatusCode::invalid_argument, "ephemeris: sqrt(a) is not that of a navigation satellite", -1, -1, e.sqrt_a);
   if (!(e.eccentricity >= 0 && e.eccentricity < 0.5))

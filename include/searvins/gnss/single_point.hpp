@@ -50,7 +50,7 @@ namespace detail {
 
 /// Lowest robust cost of descents from x0: as it is, without each constellation, and hugging the earliest codes; x0 becomes that solution.
 template <class Scalar>
-[[nodiscard]] double best_descent(const BasicSinglePointProblem<Scalar>& problem, BasicSinglePointVector<Scalar>& x0) {
+[[nodiscard]] inline double best_descent(const BasicSinglePointProblem<Scalar>& problem, BasicSinglePointVector<Scalar>& x0) {
   BasicSinglePointVector<Scalar> best = x0;
   double best_cost = std::numeric_limits<double>::infinity();
   const auto attempt = [&](std::size_t without, double lateness) {
@@ -66,8 +66,8 @@ template <class Scalar>
 
 /// Removes outliers from x until the chi-square test passes or nothing can be checked any more; x and covariance are of what is left.
 template <class Scalar>
-[[nodiscard]] Status exclude_outliers(BasicSinglePointProblem<Scalar>& problem, const SinglePointOptions& options,
-                                      BasicSinglePointVector<Scalar>& x, BasicSinglePointSolution<Scalar>& out) {
+[[nodiscard]] inline Status exclude_outliers(BasicSinglePointProblem<Scalar>& problem, const SinglePointOptions& options,
+                                             BasicSinglePointVector<Scalar>& x, BasicSinglePointSolution<Scalar>& out) {
   for (int round = 0; round < 2; ++round) {
     problem.select(x);
     for (std::size_t i = 0; i <= kMaxCodeRows; ++i) {
@@ -91,7 +91,7 @@ template <class Scalar>
 
 /// sqrt trace of (A'A)^-1 with one clock for all; infinite when singular.
 template <class Scalar>
-[[nodiscard]] double dilution(const BasicSinglePointSolution<Scalar>& s) {
+[[nodiscard]] inline double dilution(const BasicSinglePointSolution<Scalar>& s) {
   using Vector4 = Eigen::Matrix<Scalar, 4, 1>;
   using Matrix4 = Eigen::Matrix<Scalar, 4, 4>;
   Matrix4 N = Matrix4::Zero();
@@ -106,8 +106,8 @@ template <class Scalar>
 }
 
 template <class Scalar>
-void report(const BasicSinglePointProblem<Scalar>& problem, GpsTime tag, const BasicSinglePointVector<Scalar>& x,
-            BasicSinglePointSolution<Scalar>& out) {
+inline void report(const BasicSinglePointProblem<Scalar>& problem, GpsTime tag, const BasicSinglePointVector<Scalar>& x,
+                   BasicSinglePointSolution<Scalar>& out) {
   out.state = x;
   out.position_e_m = x.template head<3>();
   double clock_sum_m = 0;
@@ -127,8 +127,8 @@ void report(const BasicSinglePointProblem<Scalar>& problem, GpsTime tag, const B
 
 /// The middle one of the residuals of a constellation (nullptr: of all) at x; 0 without rows.
 template <class Scalar>
-[[nodiscard]] double median_residual_m(const BasicSinglePointProblem<Scalar>& problem, const BasicSinglePointSolution<Scalar>& s,
-                                       const BasicSinglePointVector<Scalar>& x, const Constellation* of) {
+[[nodiscard]] inline double median_residual_m(const BasicSinglePointProblem<Scalar>& problem, const BasicSinglePointSolution<Scalar>& s,
+                                              const BasicSinglePointVector<Scalar>& x, const Constellation* of) {
   StaticVector<double, kMaxCodeRows> r_m;
   for (const CodeRow& r : s.rows)
     if (r.fate == CodeFate::used && (!of || r.satellite.constellation == *of)) static_cast<void>(r_m.push_back(problem.residual_m(x, r)));
@@ -139,8 +139,8 @@ template <class Scalar>
 
 /// Clocks for a start at the prior's position: the common offset from all rows, and each clock that the prior does not know from its own.
 template <class Scalar>
-void start_clocks(const BasicSinglePointProblem<Scalar>& problem, const BasicSinglePointSolution<Scalar>& s,
-                  const BasicSinglePointPrior<Scalar>& prior, BasicSinglePointVector<Scalar>& x) {
+inline void start_clocks(const BasicSinglePointProblem<Scalar>& problem, const BasicSinglePointSolution<Scalar>& s,
+                         const BasicSinglePointPrior<Scalar>& prior, BasicSinglePointVector<Scalar>& x) {
   x.template segment<kSinglePointClocks>(3).array() += median_residual_m(problem, s, x, nullptr);
   for (std::size_t c = 0; c < kConstellations; ++c) {
     const Constellation of = static_cast<Constellation>(c);
@@ -151,8 +151,8 @@ void start_clocks(const BasicSinglePointProblem<Scalar>& problem, const BasicSin
 
 /// A start from codes alone: least squares from options.start_e_m, then the robust descent without atmosphere.
 template <class Scalar>
-[[nodiscard]] Status start_from_codes(BasicSinglePointProblem<Scalar>& problem, const SinglePointOptions& options,
-                                      BasicSinglePointVector<Scalar>& x) {
+[[nodiscard]] inline Status start_from_codes(BasicSinglePointProblem<Scalar>& problem, const SinglePointOptions& options,
+                                             BasicSinglePointVector<Scalar>& x) {
   problem.forget_place();
   x.setZero();
   x.template head<3>() = options.start_e_m;

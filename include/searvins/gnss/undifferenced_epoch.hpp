@@ -29,6 +29,7 @@
 #include <searvins/gnss/observation.hpp>
 #include <searvins/gnss/single_point_problem.hpp>
 #include <searvins/gnss/single_point_solution.hpp>
+#include <searvins/math/deferred.hpp>
 
 namespace searvins::gnss {
 
@@ -84,7 +85,9 @@ void undifference(const ObservationEpoch& rover, const EphemerisStore<E>& store,
   out.signals.clear(), out.groups.clear();
   out.satellites = 0;
   codes.rows.clear();
-  detail::SinglePointProblem problem(options, std::nullopt, codes);
+  using Scalar = math::DeferredFor<double, E>;
+  const std::optional<BasicSinglePointPrior<Scalar>> no_prior;  // the problem keeps a reference
+  detail::BasicSinglePointProblem<Scalar> problem(options, no_prior, codes);
   problem.collect(rover, store);
   problem.place(predicted_rover_e_m);
   for (const CodeRow& row : codes.rows) {

@@ -103,7 +103,7 @@ using RestStatistics = BasicRestStatistics<double>;
 
 /// Axes right, forward (of a heading), up over an up direction: the attitude of a body that stands upright on it.
 template <class Scalar = double>
-[[nodiscard]] math::Matrix3<Scalar> upright_axes(const math::Vector3<Scalar>& up_w, double heading_rad) {
+[[nodiscard]] inline math::Matrix3<Scalar> upright_axes(const math::Vector3<Scalar>& up_w, double heading_rad) {
   using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
   const Vector3 u = up_w.normalized();
   const Vector3 f = Vector3{std::sin(heading_rad), std::cos(heading_rad), 0};
@@ -119,8 +119,8 @@ template <class Scalar = double>
 /// is met where y has no part to the right of it: A cos t + B sin t = C, solved in closed form.
 /// Errors: non_finite; invalid_argument (force below 3 m/s^2, or so far from vertical in b that the forward axis has no heading): value = its size.
 template <class Scalar = double>
-[[nodiscard]] Result<math::Matrix3<Scalar>> attitude_from_force(const math::Vector3<Scalar>& force_b_mps2,
-                                                                const math::Vector3<Scalar>& force_w_mps2, double heading_rad) {
+[[nodiscard]] inline Result<math::Matrix3<Scalar>> attitude_from_force(const math::Vector3<Scalar>& force_b_mps2,
+                                                                       const math::Vector3<Scalar>& force_w_mps2, double heading_rad) {
   using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
   using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
   if (!force_b_mps2.allFinite() || !force_w_mps2.allFinite() || !std::isfinite(heading_rad))
@@ -148,8 +148,8 @@ template <class Scalar = double>
 
 /// cov(d) of the file comment. `force_covariance` is that of the specific force: noise of the mean and bias.
 template <class Scalar = double>
-[[nodiscard]] math::Matrix3<Scalar> attitude_covariance(const math::Vector3<Scalar>& up_b, const math::Matrix3<Scalar>& force_covariance,
-                                                        double gravity_mps2, double sigma_heading_rad) {
+[[nodiscard]] inline math::Matrix3<Scalar> attitude_covariance(const math::Vector3<Scalar>& up_b, const math::Matrix3<Scalar>& force_covariance,
+                                                               double gravity_mps2, double sigma_heading_rad) {
   const Eigen::Matrix<Scalar, 3, 3> U = so3::skew(up_b);
   return U * force_covariance * U.transpose() / (gravity_mps2 * gravity_mps2) + sigma_heading_rad * sigma_heading_rad * up_b * up_b.transpose();
 }
@@ -167,10 +167,10 @@ struct RestAlignment {
 /// the caller to add to the bias' sigma). A heading that is not known is passed with a sigma of pi.
 /// Errors: too_few (under 10 samples); those of attitude_from_force; rejected: the mean is not gravity's size to within 10 %: value = |mean|.
 template <class Scalar>
-[[nodiscard]] Result<RestAlignment> align_at_rest(const BasicRestStatistics<Scalar>& rest, const ImuNoise& noise,
-                                                  const math::Vector3<Scalar>& gravity_w_mps2,
-                                                  const math::Vector3<Scalar>& earth_rate_w_radps, double heading_rad,
-                                                  double sigma_heading_rad) {
+[[nodiscard]] inline Result<RestAlignment> align_at_rest(const BasicRestStatistics<Scalar>& rest, const ImuNoise& noise,
+                                                         const math::Vector3<Scalar>& gravity_w_mps2,
+                                                         const math::Vector3<Scalar>& earth_rate_w_radps, double heading_rad,
+                                                         double sigma_heading_rad) {
   using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
   using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
   if (rest.count() < 10) return failure(StatusCode::too_few, "fewer than 10 samples at rest", static_cast<std::int32_t>(rest.count()), 10);

@@ -41,7 +41,7 @@ struct AttitudeAngles {
 
 /// Attitude of angles.
 template <class Scalar = double>
-[[nodiscard]] math::Matrix3<Scalar> R_wb_from(const AttitudeAngles& a) {
+[[nodiscard]] inline math::Matrix3<Scalar> R_wb_from(const AttitudeAngles& a) {
   const double sr = std::sin(a.roll_rad), cr = std::cos(a.roll_rad), sp = std::sin(a.pitch_rad), cp = std::cos(a.pitch_rad);
   const double sh = std::sin(a.heading_rad), ch = std::cos(a.heading_rad);
   math::Matrix3<Scalar> R_wb;  // columns: right, forward, up of the body in east, north, up

@@ -68,9 +68,9 @@ namespace detail {
 
 /// The segment from a to b beside p, or verdict none_near.
 template <class Scalar>
-[[nodiscard]] CentrelineMatch beside(const math::Vector3<Scalar>& a_e_m, const math::Vector3<Scalar>& b_e_m,
-                                     const math::Vector3<Scalar>& p_e_m, const math::Vector3<Scalar>& up_e,
-                                     const math::Vector3<Scalar>& direction_e, const CentrelineOptions& options) {
+[[nodiscard]] inline CentrelineMatch beside(const math::Vector3<Scalar>& a_e_m, const math::Vector3<Scalar>& b_e_m,
+                                            const math::Vector3<Scalar>& p_e_m, const math::Vector3<Scalar>& up_e,
+                                            const math::Vector3<Scalar>& direction_e, const CentrelineOptions& options) {
   using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
   CentrelineMatch m;
   const Vector3 ab_m = b_e_m - a_e_m, along_m = ab_m - up_e.dot(ab_m) * up_e;
@@ -89,7 +89,7 @@ template <class Scalar>
 
 /// Whether the line of the segment that ends at point `end` stays within max_bend_m of its straight for reach_m on either side of the match.
 template <class Scalar>
-[[nodiscard]] bool is_straight(Centrelines lines, std::size_t end, const CentrelineMatch& m, double reach_m, double max_bend_m) {
+[[nodiscard]] inline bool is_straight(Centrelines lines, std::size_t end, const CentrelineMatch& m, double reach_m, double max_bend_m) {
   const std::uint32_t line = lines[end].line;
   const auto stays = [&](std::size_t from, int step) {
     double way_m = 0;
@@ -109,8 +109,8 @@ template <class Scalar>
 
 /// The line that a vehicle at p_e_m with velocity v_e_mps is on. `covariance_e_m2`: of p_e_m. One pass over the map.
 template <class Scalar = double>
-[[nodiscard]] CentrelineMatch match_centreline(Centrelines lines, const math::Vector3<Scalar>& p_e_m, const math::Vector3<Scalar>& v_e_mps,
-                                               const math::Matrix3<Scalar>& covariance_e_m2, const CentrelineOptions& options = {}) {
+[[nodiscard]] inline CentrelineMatch match_centreline(Centrelines lines, const math::Vector3<Scalar>& p_e_m, const math::Vector3<Scalar>& v_e_mps,
+                                                      const math::Matrix3<Scalar>& covariance_e_m2, const CentrelineOptions& options = {}) {
   using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
   CentrelineMatch best;
   const Vector3 up_e = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(p_e_m)).col(2);
@@ -133,7 +133,8 @@ template <class Scalar = double>
     const bool is_nearer = best.verdict != CentrelineVerdict::matched || std::abs(m.offset_m) < std::abs(best.offset_m);
     const CentrelineMatch& other = is_nearer ? best : m;
     const std::uint32_t other_line = is_nearer ? line : lines[i].line;
-    if (other.verdict == CentrelineVerdict::matched && other_line != (is_nearer ? lines[i].line : line)) second_m = std::min(second_m, std::abs(other.offset_m) - gate_m(other));
+    if (other.verdict == CentrelineVerdict::matched && other_line != (is_nearer ? lines[i].line : line))
+      second_m = std::min(second_m, std::abs(other.offset_m) - gate_m(other));
     if (is_nearer) best = m, line = lines[i].line, end = i;
   }
   if (best.verdict != CentrelineVerdict::matched) return best;

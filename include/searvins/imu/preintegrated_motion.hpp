@@ -39,7 +39,7 @@ struct ImuBias {
 
 /// The biases of a navigation state.
 template <class S>
-[[nodiscard]] ImuBias<S> bias_of(const BasicNavigationState<S>& x) {
+[[nodiscard]] inline ImuBias<S> bias_of(const BasicNavigationState<S>& x) {
   return {x.accel_bias_b_mps2, x.gyro_bias_b_radps};
 }
 

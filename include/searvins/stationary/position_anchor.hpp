@@ -107,9 +107,9 @@ using PositionAnchorPriorFactor = BasicPositionAnchorPriorFactor<double>;
 /// The prior of an anchor that is latched at a position with this covariance (w, m^2). The floor, 5 cm by default, adds to every axis.
 /// Errors: non_finite, not_positive_definite (index: the pivot).
 template <class Scalar = double>
-[[nodiscard]] Result<BasicPositionAnchorPriorFactor<Scalar>> latch(smoother::Key<BasicPositionAnchor<Scalar>> anchor,
-                                                                   const math::Vector3<Scalar>& position_w_m,
-                                                                   const math::Matrix3<Scalar>& covariance_w_m2, double floor_m = 0.05) {
+[[nodiscard]] inline Result<BasicPositionAnchorPriorFactor<Scalar>> latch(smoother::Key<BasicPositionAnchor<Scalar>> anchor,
+                                                                          const math::Vector3<Scalar>& position_w_m,
+                                                                          const math::Matrix3<Scalar>& covariance_w_m2, double floor_m = 0.05) {
   using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
   if (!position_w_m.allFinite() || !covariance_w_m2.allFinite()) return failure(StatusCode::non_finite, "anchor position or covariance is not finite");
   const Matrix3 C = covariance_w_m2 + floor_m * floor_m * Matrix3::Identity();

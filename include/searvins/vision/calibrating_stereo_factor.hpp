@@ -50,8 +50,8 @@ struct FrameMotion {
 
 /// Where the body carries the camera in u seconds: its place in the body at the state, by which a frame of u seconds later is seen.
 template <class Scalar>
-[[nodiscard]] StereoCamera<Scalar> carried(const StereoCamera<Scalar>& camera, std::type_identity_t<Scalar> u_s,
-                                           const math::Vector3<Scalar>& v_b_mps, const math::Vector3<Scalar>& rate_b_radps) {
+[[nodiscard]] inline StereoCamera<Scalar> carried(const StereoCamera<Scalar>& camera, std::type_identity_t<Scalar> u_s,
+                                                  const math::Vector3<Scalar>& v_b_mps, const math::Vector3<Scalar>& rate_b_radps) {
   StereoCamera<Scalar> there = camera;
   const Eigen::Matrix<Scalar, 3, 3> turn = so3::exp(Eigen::Matrix<Scalar, 3, 1>{u_s * rate_b_radps});
   there.p_bc_m = turn * camera.p_bc_m + u_s * v_b_mps;

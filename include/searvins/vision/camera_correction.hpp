@@ -83,7 +83,7 @@ struct CameraCorrectionOptions {
 
 /// Covariance of the walk over a time.
 template <class Scalar = double>
-[[nodiscard]] Eigen::Matrix<Scalar, 4, 4> walk_covariance(const CameraCorrectionOptions& options, double duration_s) {
+[[nodiscard]] inline Eigen::Matrix<Scalar, 4, 4> walk_covariance(const CameraCorrectionOptions& options, double duration_s) {
   const auto variance = [duration_s](double density) { return density * density * duration_s; };
   using Vector4 = Eigen::Matrix<Scalar, 4, 1>;
   Vector4 v = Vector4::Constant(variance(options.boresight_walk_rad_sqrt_s));
@@ -92,7 +92,7 @@ template <class Scalar = double>
 }
 /// Covariance before anything was seen.
 template <class Scalar = double>
-[[nodiscard]] Eigen::Matrix<Scalar, 4, 4> prior_covariance(const CameraCorrectionOptions& options) {
+[[nodiscard]] inline Eigen::Matrix<Scalar, 4, 4> prior_covariance(const CameraCorrectionOptions& options) {
   using Vector4 = Eigen::Matrix<Scalar, 4, 1>;
   Vector4 v = Vector4::Constant(options.boresight_sigma_rad * options.boresight_sigma_rad);
   v[BasicCameraCorrection<Scalar>::offset] = options.offset_sigma_s * options.offset_sigma_s;

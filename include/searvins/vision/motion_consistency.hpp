@@ -72,8 +72,8 @@ struct MotionDifference {
 
 /// `covariance`: of the seen motion. A prediction that is not finite is infinitely far away.
 template <class Scalar = double>
-[[nodiscard]] MotionDifference difference(const BasicCameraMotion<Scalar>& seen, const math::Matrix<Scalar, 6, 6>& covariance,
-                                          const BasicPredictedMotion<Scalar>& predicted, const ConsistencyOptions& options = {}) {
+[[nodiscard]] inline MotionDifference difference(const BasicCameraMotion<Scalar>& seen, const math::Matrix<Scalar, 6, 6>& covariance,
+                                                 const BasicPredictedMotion<Scalar>& predicted, const ConsistencyOptions& options = {}) {
   const Eigen::Matrix<Scalar, 6, 1> delta = seen.minus(predicted.motion);
   const Eigen::Matrix<Scalar, 6, 6> both = covariance + predicted.covariance;
   MotionDifference d;

@@ -96,7 +96,7 @@ class SplitMix {
 
 /// Lower Cholesky factor of I + T T', which is never singular.
 template <class Scalar = double>
-[[nodiscard]] Eigen::Matrix<Scalar, 3, 3> residual_factor(const math::Matrix3<Scalar>& T) {
+[[nodiscard]] inline Eigen::Matrix<Scalar, 3, 3> residual_factor(const math::Matrix3<Scalar>& T) {
   using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
   Matrix3 S = Matrix3::Identity();
   S.noalias() += T * T.transpose();

@@ -51,7 +51,7 @@ namespace searvins::vision {
 
 /// Noise of an observation with the same sigma, independent, on uL, uR and v.
 template <class Scalar = double>
-[[nodiscard]] Eigen::Matrix<Scalar, 3, 3> pixel_covariance_px2(std::type_identity_t<Scalar> sigma_px) {
+[[nodiscard]] inline Eigen::Matrix<Scalar, 3, 3> pixel_covariance_px2(std::type_identity_t<Scalar> sigma_px) {
   return sigma_px * sigma_px * Eigen::Matrix<Scalar, 3, 3>::Identity();
 }
 

@@ -37,7 +37,7 @@ using PointTriple = BasicPointTriple<double>;
 
 /// Twice the area of a triangle over the square of its longest side: 0 for points on a line, sqrt(3)/2 at most. NaN for one point thrice.
 template <class Scalar = double>
-[[nodiscard]] Scalar triangle_shape(const BasicPointTriple<Scalar>& p) {
+[[nodiscard]] inline Scalar triangle_shape(const BasicPointTriple<Scalar>& p) {
   const Eigen::Matrix<Scalar, 3, 1> u = p[1] - p[0], v = p[2] - p[0];
   const Scalar longest2 = std::max({u.squaredNorm(), v.squaredNorm(), (v - u).squaredNorm()});
   return u.cross(v).norm() / longest2;
@@ -47,7 +47,7 @@ namespace detail {
 
 /// Orthonormal axes of a triangle: its first side, the direction in its plane, its normal.
 template <class Scalar>
-[[nodiscard]] Eigen::Matrix<Scalar, 3, 3> triangle_axes(const BasicPointTriple<Scalar>& p) {
+[[nodiscard]] inline Eigen::Matrix<Scalar, 3, 3> triangle_axes(const BasicPointTriple<Scalar>& p) {
   Eigen::Matrix<Scalar, 3, 3> F;
   F.col(0) = (p[1] - p[0]).normalized();
   F.col(2) = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
@@ -60,8 +60,9 @@ template <class Scalar>
 /// The motion that aligns three points; p_prev_m[i] and p_cur_m[i] are the same point.
 /// Errors: under_determined (a triangle of triangle_shape below min_shape, or not finite; value: the shape).
 template <class Scalar = double>
-[[nodiscard]] Result<BasicCameraMotion<Scalar>> align_three_points(const BasicPointTriple<Scalar>& p_prev_m,
-                                                                   const BasicPointTriple<Scalar>& p_cur_m, double min_shape = 0.02) {
+[[nodiscard]] inline Result<BasicCameraMotion<Scalar>> align_three_points(const BasicPointTriple<Scalar>& p_prev_m,
+                                                                          const BasicPointTriple<Scalar>& p_cur_m,
+                                                                          double min_shape = 0.02) {
   using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
   using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
   const Scalar shape_prev = triangle_shape(p_prev_m), shape_cur = triangle_shape(p_cur_m);
