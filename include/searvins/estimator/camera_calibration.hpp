@@ -64,7 +64,7 @@ class BasicKnownCamera {
   template <class Smoother>
   void remember(Smoother&) {}
 };
-using KnownCamera = BasicKnownCamera<double>;
+using KnownCamera = BasicKnownCamera<double>;  ///< in double precision
 
 /// See the file comment. Scalar: double, as that of the states.
 template <class Scalar>
@@ -145,6 +145,6 @@ class BasicCalibratedCamera {
   GpsTime begun_{}, remembered_{};
   bool was_used_{false};
 };
-using CalibratedCamera = BasicCalibratedCamera<double>;
+using CalibratedCamera = BasicCalibratedCamera<double>;  ///< in double precision
 
 }  // namespace searvins::estimator

@@ -77,6 +77,6 @@ class BasicCameraPredictor {
   Vector3 arm_b_m_;
   std::optional<Place> before_;
 };
-using CameraPredictor = BasicCameraPredictor<double>;
+using CameraPredictor = BasicCameraPredictor<double>;  ///< in double precision
 
 }  // namespace searvins::estimator

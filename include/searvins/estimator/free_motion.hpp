@@ -90,6 +90,6 @@ class BasicFreeMotion {
  private:
   RtkOptions options_;
 };
-using FreeMotion = BasicFreeMotion<double>;
+using FreeMotion = BasicFreeMotion<double>;  ///< in double precision
 
 }  // namespace searvins::estimator

@@ -28,7 +28,7 @@ struct BasicLocalFrame {
   [[nodiscard]] Vector3 to_local(const Vector3& p_e_m) const { return R_ew.transpose() * (p_e_m - origin_e_m); }
   [[nodiscard]] Vector3 to_ecef(const Vector3& p_w_m) const { return origin_e_m + R_ew * p_w_m; }
 };
-using LocalFrame = BasicLocalFrame<double>;
+using LocalFrame = BasicLocalFrame<double>;  ///< in double precision
 
 /// Azimuth (clockwise from north) and elevation of a line of sight, radians.
 struct AzimuthElevation {

@@ -66,7 +66,7 @@ struct BasicDopplerRow {
   Direction direction{Direction::Zero()};  ///< d rate / d (velocity, drift)
 };
 
-using DopplerRow = BasicDopplerRow<double>;  ///< of doubles
+using DopplerRow = BasicDopplerRow<double>;  ///< in double precision
 
 inline constexpr std::size_t kMaxDopplerRows = 2 * kMaxSatellitesPerEpoch;  ///< Dopplers of one solution
 
@@ -88,7 +88,7 @@ struct BasicDopplerVelocity {
   [[nodiscard]] math::Matrix3<Scalar> velocity_covariance_m2ps2() const { return covariance.template topLeftCorner<3, 3>(); }
 };
 
-using DopplerVelocity = BasicDopplerVelocity<double>;  ///< of doubles
+using DopplerVelocity = BasicDopplerVelocity<double>;  ///< in double precision
 
 namespace detail {
 

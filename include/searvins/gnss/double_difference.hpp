@@ -395,6 +395,6 @@ class BasicDifferencer {
   StaticVector<std::uint8_t, kMaxCorrectedSignals> pair_of_{};
   StaticVector<ContinuityVerdict, kMaxCorrectedSignals> verdicts_{};
 };
-using Differencer = BasicDifferencer<double>;
+using Differencer = BasicDifferencer<double>;  ///< in double precision
 
 }  // namespace searvins::gnss

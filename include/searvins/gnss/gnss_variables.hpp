@@ -42,7 +42,7 @@ struct BasicAmbiguity : detail::RealVariable<BasicAmbiguity<S>, S, smoother::Rol
   /// Linear in every factor, so it never forces a relinearisation; a millicycle is what the convergence test resolves at its default.
   [[nodiscard]] static Step linearisation_scale() { return Step{S{10}}; }
 };
-using Ambiguity = BasicAmbiguity<double>;
+using Ambiguity = BasicAmbiguity<double>;  ///< in double precision
 
 /// Error of a batch's pivot observation, metres or m/s.
 template <class S>
@@ -52,7 +52,7 @@ struct BasicPivotError : detail::RealVariable<BasicPivotError<S>, S, smoother::R
   static constexpr const char* axis_name(int) { return "metres"; }
   [[nodiscard]] static Step linearisation_scale() { return Step{S{1}}; }
 };
-using PivotError = BasicPivotError<double>;
+using PivotError = BasicPivotError<double>;  ///< in double precision
 
 static_assert(smoother::Variable<Ambiguity> && smoother::Variable<PivotError>);
 

@@ -58,7 +58,7 @@ struct BasicPva {
     return {p_wa_m + dt_s * v_wa_mps + dt_s * dt_s / 2 * a_wa_mps2, v_wa_mps + dt_s * a_wa_mps2, a_wa_mps2};
   }
 };
-using Pva = BasicPva<double>;
+using Pva = BasicPva<double>;  ///< in double precision
 
 /// Antenna position of a state in w, metres; optionally d p / d state.
 template <class Scalar>
@@ -136,7 +136,7 @@ struct BasicWhiteJerkFactor {
     return R;
   }
 };
-using WhiteJerkFactor = BasicWhiteJerkFactor<double>;
+using WhiteJerkFactor = BasicWhiteJerkFactor<double>;  ///< in double precision
 
 /// A Gaussian prior on a state, independent per group: the start of a trajectory.
 template <class S>
@@ -169,7 +169,7 @@ struct BasicPvaPriorFactor {
  private:
   [[nodiscard]] Scalar sigma(int i) const { return i < 3 ? sigma_position_m : i < 6 ? sigma_velocity_mps : sigma_acceleration_mps2; }
 };
-using PvaPriorFactor = BasicPvaPriorFactor<double>;
+using PvaPriorFactor = BasicPvaPriorFactor<double>;  ///< in double precision
 
 static_assert(smoother::Variable<Pva> && smoother::Factor<WhiteJerkFactor> && smoother::Factor<PvaPriorFactor>);
 

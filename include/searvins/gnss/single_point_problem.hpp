@@ -309,7 +309,7 @@ class BasicSinglePointProblem {
   KlobucharCoefficients ionosphere_{};
 };
 
-using SinglePointProblem = BasicSinglePointProblem<double>;
+using SinglePointProblem = BasicSinglePointProblem<double>;  ///< in double precision
 
 }  // namespace detail
 }  // namespace searvins::gnss

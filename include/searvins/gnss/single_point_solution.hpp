@@ -33,11 +33,11 @@ inline constexpr std::size_t kMaxCodeRows = kCodesPerSatellite * kMaxSatellitesP
 /// Not aligned for vector registers: the layout of a solution does not follow machine flags.
 template <class Scalar>
 using BasicSinglePointVector = Eigen::Matrix<Scalar, kSinglePointUnknowns, 1, Eigen::DontAlign>;
-using SinglePointVector = BasicSinglePointVector<double>;  ///< of doubles
+using SinglePointVector = BasicSinglePointVector<double>;  ///< in double precision
 /// Covariance of a SinglePointVector, m^2.
 template <class Scalar>
 using BasicSinglePointMatrix = Eigen::Matrix<Scalar, kSinglePointUnknowns, kSinglePointUnknowns, Eigen::DontAlign>;
-using SinglePointMatrix = BasicSinglePointMatrix<double>;  ///< of doubles
+using SinglePointMatrix = BasicSinglePointMatrix<double>;  ///< in double precision
 
 /// What became of a satellite's code.
 enum class CodeFate : std::uint8_t {
@@ -90,7 +90,7 @@ struct BasicSinglePointPrior {
   }
 };
 
-using SinglePointPrior = BasicSinglePointPrior<double>;  ///< of doubles
+using SinglePointPrior = BasicSinglePointPrior<double>;  ///< in double precision
 
 /// One code in the solution, or the reason why it is not.
 struct CodeRow {
@@ -129,6 +129,6 @@ struct BasicSinglePointSolution {
   [[nodiscard]] math::Matrix3<Scalar> position_covariance_m2() const { return covariance.template topLeftCorner<3, 3>(); }
 };
 
-using SinglePointSolution = BasicSinglePointSolution<double>;  ///< of doubles
+using SinglePointSolution = BasicSinglePointSolution<double>;  ///< in double precision
 
 }  // namespace searvins::gnss

@@ -83,7 +83,7 @@ struct BasicTrackedPosition {
   BasicSinglePointSolution<Scalar> single_point{};  ///< rows, residuals and clocks of this epoch; empty when coasted
 };
 
-using TrackedPosition = BasicTrackedPosition<double>;  ///< of doubles
+using TrackedPosition = BasicTrackedPosition<double>;  ///< in double precision
 
 /// The filter. Feed epochs in time order. Scalar: double or wider.
 template <class Scalar>

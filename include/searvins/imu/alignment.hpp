@@ -99,7 +99,7 @@ class BasicRestStatistics {
   Vector3 mean_accel_{Vector3::Zero()}, mean_gyro_{Vector3::Zero()};
   Matrix3 accel_squares_{Matrix3::Zero()}, gyro_squares_{Matrix3::Zero()};
 };
-using RestStatistics = BasicRestStatistics<double>;
+using RestStatistics = BasicRestStatistics<double>;  ///< in double precision
 
 /// Axes right, forward (of a heading), up over an up direction: the attitude of a body that stands upright on it.
 template <class Scalar = double>

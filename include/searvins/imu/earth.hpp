@@ -40,7 +40,7 @@ struct BasicGravityField {
 
   [[nodiscard]] Vector3 at(const Vector3& p_w_m) const { return gravity_w_mps2 + gradient_w_ps2 * (p_w_m - reference_w_m); }
 };
-using GravityField = BasicGravityField<double>;
+using GravityField = BasicGravityField<double>;  ///< in double precision
 
 /// How the Earth enters: whether w turns (a compile-time policy), how fast, and the gravity near a position; all in the model's Scalar.
 template <class E>
@@ -96,7 +96,7 @@ struct BasicConstantGravity {
     return {p_w_m, gravity_w_mps2, Eigen::Matrix<S, 3, 3>::Zero()};
   }
 };
-using ConstantGravity = BasicConstantGravity<double>;
+using ConstantGravity = BasicConstantGravity<double>;  ///< in double precision
 
 static_assert(EarthModel<RotatingEarth> && EarthModel<FlatEarth> && EarthModel<ConstantGravity>);
 
@@ -126,6 +126,6 @@ struct BasicEarthTurn {
     return turn;
   }
 };
-using EarthTurn = BasicEarthTurn<double>;
+using EarthTurn = BasicEarthTurn<double>;  ///< in double precision
 
 }  // namespace searvins::imu

@@ -36,7 +36,7 @@ struct BasicImuSample {
 
   [[nodiscard]] bool finite() const { return gyro_b_radps.allFinite() && accel_b_mps2.allFinite(); }
 };
-using ImuSample = BasicImuSample<double>;
+using ImuSample = BasicImuSample<double>;  ///< in double precision
 
 /// Noise of a unit: densities of white noise and of the bias walks, and how far a bias may be off at the start. Defaults: a MEMS unit for vehicles.
 struct ImuNoise {

@@ -112,7 +112,7 @@ struct BasicAlignment {
   /// Sigma of each tangent axis.
   [[nodiscard]] Eigen::Matrix<Scalar, NavigationState::dof, 1> sigmas() const { return covariance.diagonal().cwiseSqrt(); }
 };
-using Alignment = BasicAlignment<double>;
+using Alignment = BasicAlignment<double>;  ///< in double precision
 
 /// See the file comment.
 template <class Scalar>
@@ -551,6 +551,6 @@ class BasicInitializer {
   double interval_s_{0};
   Vector3 interval_force_b_{Vector3::Zero()};
 };
-using Initializer = BasicInitializer<double>;
+using Initializer = BasicInitializer<double>;  ///< in double precision
 
 }  // namespace searvins::imu

@@ -55,6 +55,6 @@ struct BasicLeverArm {
     return x.v_wb_mps + x.R_wb * swing;
   }
 };
-using LeverArm = BasicLeverArm<double>;
+using LeverArm = BasicLeverArm<double>;  ///< in double precision
 
 }  // namespace searvins::imu

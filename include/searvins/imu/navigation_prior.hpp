@@ -95,7 +95,7 @@ struct BasicNavigationPriorFactor {
     }
   }
 };
-using NavigationPriorFactor = BasicNavigationPriorFactor<double>;
+using NavigationPriorFactor = BasicNavigationPriorFactor<double>;  ///< in double precision
 
 static_assert(smoother::Factor<NavigationPriorFactor>);
 

@@ -64,7 +64,7 @@ struct BasicNavigationState {
     return s;
   }
 };
-using NavigationState = BasicNavigationState<double>;
+using NavigationState = BasicNavigationState<double>;  ///< in double precision
 
 static_assert(smoother::Variable<NavigationState>);
 

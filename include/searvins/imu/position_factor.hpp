@@ -74,7 +74,7 @@ struct BasicPositionFactor {
     return loss.rho(z2);
   }
 };
-using PositionFactor = BasicPositionFactor<double>;
+using PositionFactor = BasicPositionFactor<double>;  ///< in double precision
 
 static_assert(smoother::Factor<PositionFactor>);
 

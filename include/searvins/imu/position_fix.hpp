@@ -28,6 +28,6 @@ struct BasicPositionFix {
 
   [[nodiscard]] bool has_velocity() const { return velocity_e_mps.allFinite() && sigma_velocity_mps > 0; }
 };
-using PositionFix = BasicPositionFix<double>;
+using PositionFix = BasicPositionFix<double>;  ///< in double precision
 
 }  // namespace searvins::imu

@@ -30,7 +30,7 @@ namespace searvins::imu {
 /// Covariance of a navigation state, in the order of its tangent vector.
 template <class Scalar>
 using BasicNavigationCovariance = Eigen::Matrix<Scalar, 15, 15>;
-using NavigationCovariance = BasicNavigationCovariance<double>;
+using NavigationCovariance = BasicNavigationCovariance<double>;  ///< in double precision
 
 /// The state at the end of a motion. The motion's first-order bias correction is applied for the biases of `x`.
 template <EarthModel Earth>

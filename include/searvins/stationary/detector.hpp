@@ -185,6 +185,6 @@ class BasicDetector {
   bool stationary_{false};
   GpsTime since_{};
 };
-using Detector = BasicDetector<double>;
+using Detector = BasicDetector<double>;  ///< in double precision
 
 }  // namespace searvins::stationary

@@ -40,7 +40,7 @@ struct BasicPositionAnchor {
   /// Linear in every factor; a metre gives the convergence test its millimetre.
   [[nodiscard]] static Step linearisation_scale() { return Step::Ones(); }
 };
-using PositionAnchor = BasicPositionAnchor<double>;
+using PositionAnchor = BasicPositionAnchor<double>;  ///< in double precision
 
 /// r = p_wb - s.
 template <class S>
@@ -72,7 +72,7 @@ struct BasicPositionAnchorFactor {
   }
   Scalar weigh(const Scalar* e, Scalar* w) const { return smoother::weigh_gaussian(e, 3, w); }
 };
-using PositionAnchorFactor = BasicPositionAnchorFactor<double>;
+using PositionAnchorFactor = BasicPositionAnchorFactor<double>;  ///< in double precision
 
 /// The latched prior of an anchor.
 template <class S>
@@ -102,7 +102,7 @@ struct BasicPositionAnchorPriorFactor {
   }
   Scalar weigh(const Scalar* e, Scalar* w) const { return smoother::weigh_gaussian(e, 3, w); }
 };
-using PositionAnchorPriorFactor = BasicPositionAnchorPriorFactor<double>;
+using PositionAnchorPriorFactor = BasicPositionAnchorPriorFactor<double>;  ///< in double precision
 
 /// The prior of an anchor that is latched at a position with this covariance (w, m^2). The floor, 5 cm by default, adds to every axis.
 /// Errors: non_finite, not_positive_definite (index: the pivot).

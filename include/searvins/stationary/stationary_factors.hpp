@@ -49,7 +49,7 @@ struct BasicZeroVelocityFactor {
   }
   Scalar weigh(const Scalar* e, Scalar* w) const { return smoother::weigh_gaussian(e, 3, w); }
 };
-using ZeroVelocityFactor = BasicZeroVelocityFactor<double>;
+using ZeroVelocityFactor = BasicZeroVelocityFactor<double>;  ///< in double precision
 
 /// The body does not turn relative to the Earth: the mean of the gyroscope over an interval around the state is its bias and the Earth.
 template <class S>
@@ -83,7 +83,7 @@ struct BasicZeroAngularRateFactor {
   }
   Scalar weigh(const Scalar* e, Scalar* w) const { return smoother::weigh_gaussian(e, 3, w); }
 };
-using ZeroAngularRateFactor = BasicZeroAngularRateFactor<double>;
+using ZeroAngularRateFactor = BasicZeroAngularRateFactor<double>;  ///< in double precision
 
 /// The vehicle neither slides sideways nor lifts off.
 template <class S>
@@ -131,7 +131,7 @@ struct BasicNonHolonomicFactor {
   }
   Scalar weigh(const Scalar* e, Scalar* w) const { return smoother::weigh_gaussian(e, 2, w); }
 };
-using NonHolonomicFactor = BasicNonHolonomicFactor<double>;
+using NonHolonomicFactor = BasicNonHolonomicFactor<double>;  ///< in double precision
 
 static_assert(smoother::Factor<ZeroVelocityFactor> && smoother::Factor<ZeroAngularRateFactor> && smoother::Factor<NonHolonomicFactor>);
 

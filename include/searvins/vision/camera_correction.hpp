@@ -63,7 +63,7 @@ struct BasicCameraCorrection {
   [[nodiscard]] static Step linearisation_scale() { return Step::Constant(1e-2); }
 };
 
-using CameraCorrection = BasicCameraCorrection<double>;
+using CameraCorrection = BasicCameraCorrection<double>;  ///< in double precision
 
 /// A correction and how well it is known.
 template <class Scalar>
@@ -72,7 +72,7 @@ struct BasicCameraCorrectionEstimate {
   Eigen::Matrix<Scalar, 4, 4, Eigen::DontAlign> covariance{Eigen::Matrix<Scalar, 4, 4>::Zero()};  ///< in the order of the tangent vector
 };
 
-using CameraCorrectionEstimate = BasicCameraCorrectionEstimate<double>;
+using CameraCorrectionEstimate = BasicCameraCorrectionEstimate<double>;  ///< in double precision
 
 /// How well a calibration is trusted, and how steady it is.
 struct CameraCorrectionOptions {
@@ -140,7 +140,7 @@ struct BasicCameraCorrectionPriorFactor {
   S weigh(const S* e, S* w) const { return smoother::weigh_gaussian(e, 4, w); }
 };
 
-using CameraCorrectionPriorFactor = BasicCameraCorrectionPriorFactor<double>;
+using CameraCorrectionPriorFactor = BasicCameraCorrectionPriorFactor<double>;  ///< in double precision
 
 /// One correction goes over into the next; see the file comment.
 template <class S>
@@ -186,7 +186,7 @@ struct BasicCameraCorrectionWalk {
   S weigh(const S* e, S* w) const { return smoother::weigh_gaussian(e, 4, w); }
 };
 
-using CameraCorrectionWalk = BasicCameraCorrectionWalk<double>;
+using CameraCorrectionWalk = BasicCameraCorrectionWalk<double>;  ///< in double precision
 
 static_assert(smoother::Variable<CameraCorrection> && smoother::Factor<CameraCorrectionPriorFactor> &&
               smoother::Factor<CameraCorrectionWalk>);

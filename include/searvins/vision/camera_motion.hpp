@@ -50,6 +50,6 @@ struct BasicCameraMotion {
   [[nodiscard]] bool finite() const { return R_prev_cur.allFinite() && t_prev_cur_m.allFinite(); }
 };
 
-using CameraMotion = BasicCameraMotion<double>;
+using CameraMotion = BasicCameraMotion<double>;  ///< in double precision
 
 }  // namespace searvins::vision

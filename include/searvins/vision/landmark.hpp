@@ -39,7 +39,7 @@ struct BasicLandmark {
   [[nodiscard]] static Step linearisation_scale() { return Step::Ones(); }
 };
 
-using Landmark = BasicLandmark<double>;
+using Landmark = BasicLandmark<double>;  ///< in double precision
 
 /// The weak prior of the file comment.
 template <class S>
@@ -80,7 +80,7 @@ struct BasicLandmarkPriorFactor {
   S weigh(const S* e, S* w) const { return smoother::weigh_gaussian(e, 3, w); }
 };
 
-using LandmarkPriorFactor = BasicLandmarkPriorFactor<double>;
+using LandmarkPriorFactor = BasicLandmarkPriorFactor<double>;  ///< in double precision
 
 static_assert(smoother::Variable<Landmark> && smoother::Factor<LandmarkPriorFactor>);
 

@@ -62,7 +62,7 @@ struct BasicPredictedMotion {
   Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign> covariance{Eigen::Matrix<Scalar, 6, 6>::Zero()};
 };
 
-using PredictedMotion = BasicPredictedMotion<double>;
+using PredictedMotion = BasicPredictedMotion<double>;  ///< in double precision
 
 /// How far two motions are apart, and how far they may be for `full`.
 struct MotionDifference {

@@ -33,7 +33,7 @@ namespace searvins::vision {
 /// Three points in the axes of one camera, m.
 template <class Scalar>
 using BasicPointTriple = std::array<Eigen::Matrix<Scalar, 3, 1>, 3>;
-using PointTriple = BasicPointTriple<double>;
+using PointTriple = BasicPointTriple<double>;  ///< in double precision
 
 /// Twice the area of a triangle over the square of its longest side: 0 for points on a line, sqrt(3)/2 at most. NaN for one point thrice.
 template <class Scalar = double>
