@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <string>
 #include <type_traits>
 #include <vector>
 
@@ -26,6 +27,17 @@ void check_same(const Vector& vector, const std::vector<int>& model) {
   CHECK(vector.full() == (model.size() == kVectorCapacity));
   for (std::size_t i = vector.size(); i < kVectorCapacity; ++i) CHECK(vector.data()[i] == 0);  // past the end: default values
 }
+
+/// An element that owns something: counts how many live, and holds a value that only its default has.
+struct Counted {
+  inline static int alive = 0;
+  std::string text{"default, and too long to be kept in place"};
+
+  Counted() { ++alive; }
+  Counted(const Counted& other) : text(other.text) { ++alive; }
+  Counted& operator=(const Counted&) = default;
+  ~Counted() { --alive; }
+};
 
 /// One random operation on both; whatever the vector refuses must leave it as it was.
 void random_step(Rng& rng, Vector& vector, std::vector<int>& model) {
@@ -126,6 +138,24 @@ TEST_CASE("StaticVector: same content, same bytes, whatever the history") {
   roundabout.erase(3);
   REQUIRE(roundabout.size() == direct.size());
   for (std::size_t i = 0; i < kVectorCapacity; ++i) CHECK(direct.data()[i] == roundabout.data()[i]);
+}
+
+TEST_CASE("StaticVector: elements that vanish are destroyed and made anew in place") {
+  {
+    StaticVector<Counted, 5> vector;
+    searvins::test::for_all_seeds(100, [&](Rng& rng) {
+      Counted mine;
+      mine.text = std::to_string(integer(rng, 0, 999)) + ", neither the default nor short enough";
+      static_cast<void>(vector.push_back(mine));
+      static_cast<void>(vector.insert(static_cast<std::size_t>(integer(rng, 0, 5)), mine));
+      if (integer(rng, 0, 1)) vector.erase(static_cast<std::size_t>(integer(rng, 0, 5)));
+      if (integer(rng, 0, 3) == 0) vector.resize(static_cast<std::size_t>(integer(rng, 0, 5)));
+      if (integer(rng, 0, 3) == 0) vector.pop_back();
+      CHECK(Counted::alive == 5 + 1);
+      for (std::size_t i = vector.size(); i < vector.capacity(); ++i) CHECK(vector.data()[i].text == Counted{}.text);
+    });
+  }
+  CHECK(Counted::alive == 0);
 }
 
 TEST_CASE("StaticVector: usable at compile time, trivially copyable when its element is") {

@@ -5,11 +5,13 @@
 
 #include <array>
 #include <cstddef>
+#include <new>
+#include <type_traits>
 #include <utility>
 
 namespace searvins {
 
-/// Up to N values of T in place, T default constructible. Elements past size() are default values, so a copied vector of the same
+/// Up to N values of T in place; T is made by default without fail. Elements past size() are default values, so a copied vector of the same
 /// content is the same bytes whatever its history (bit-identical reruns). Order of push_back is kept; iteration is by pointer.
 template <class T, std::size_t N>
 class StaticVector {
@@ -37,14 +39,14 @@ class StaticVector {
   }
 
   constexpr void pop_back() {
-    if (size_ > 0) data_[--size_] = T{};
+    if (size_ > 0) renew(--size_);
   }
   constexpr void clear() { resize(0); }
 
   /// New size, at most N: elements that appear or vanish are set to T{}. False (and no change) when n > N.
   constexpr bool resize(std::size_t n) {
     if (n > N) return false;
-    for (std::size_t i = n; i < size_; ++i) data_[i] = T{};
+    for (std::size_t i = n; i < size_; ++i) renew(i);
     size_ = n;
     return true;
   }
@@ -94,6 +96,16 @@ class StaticVector {
   [[nodiscard]] constexpr const_iterator end() const { return data_.data() + size_; }
 
  private:
+  /// Element i as a default value, made in place: an epoch of observations is 25 kB, too much for a temporary on a small stack.
+  constexpr void renew(std::size_t i) {
+    if (std::is_constant_evaluated()) {
+      data_[i] = T{};
+    } else {
+      data_[i].~T();
+      ::new (static_cast<void*>(&data_[i])) T{};
+    }
+  }
+
   std::array<T, N> data_{};
   std::size_t size_{0};
 };
