@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// \file
 /// Capacities for small memories, and what an RTK estimator with them takes: its `sizeof`, since it never allocates. All of it is known to
-/// the compiler,
-/// so a firmware that outgrows its memory does not build (kRamBudgetBytes).
+/// the compiler, so a firmware that outgrows its memory does not build (kRamBudgetBytes).
 #pragma once
 
 #include <cstddef>

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// \file
 /// searvins_cortex_m_compare TARGET HOST: whether two transcripts (transcript.hpp) say the same, to the tolerance that each line states.
-/// Prints the
-/// largest difference of each name. 0: they do; 1: they do not; 2: nothing to compare.
+/// Prints the largest difference of each name. 0: they do; 1: they do not; 2: nothing to compare.
 #include <bit>
 #include <cmath>
 #include <cstdint>

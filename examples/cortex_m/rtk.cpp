@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Robust RTK from baked-in observations through the same estimator and smoother as on a desktop, with small capacities: eight seconds
-// under open sky,
-// then eight between walls with reflections. Passes when every position is right within bounds and integers were found.
+// under open sky, then eight between walls with reflections. Passes when every position is right within bounds and integers were found.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
