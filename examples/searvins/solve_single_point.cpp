@@ -25,32 +25,29 @@ class SinglePointRun final : public EpochRun {
   Status add_base(const gnss::ObservationEpoch&) override { return failure(StatusCode::unsupported, "a single-point run has no base"); }
 
   [[nodiscard]] const gnss::DifferencedEpoch* differenced() const override { return nullptr; }
-  [[nodiscard]] const gnss::SinglePointSolution& single_point() const override { return single_point_; }
+  [[nodiscard]] const gnss::SinglePointSolution& single_point() const override { return tracked_.single_point; }
   [[nodiscard]] std::optional<LaggedEstimate> oldest() const override { return std::nullopt; }
 
  private:
   Result<estimator::RtkSolution> update(const gnss::ObservationEpoch& rover) override {
-    single_point_ = {};
-    const Result<gnss::TrackedPosition> tracked = tracker_.update(rover, ephemerides_);
-    if (!tracked.ok()) return tracked.status();
-    single_point_ = tracked->single_point;
+    if (const Status s = tracker_.update(rover, ephemerides_, tracked_); !s.ok()) return s;
     estimator::RtkSolution out;
-    out.tag = rover.tag, out.time = tracked->time;
-    out.status = tracked->status == gnss::TrackStatus::coasted ? estimator::SolutionStatus::dr : estimator::SolutionStatus::spp;
-    out.position_e_m = tracked->position_e_m, out.velocity_e_mps = tracked->velocity_e_mps;
-    const Eigen::Matrix3d R_ew = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(tracked->position_e_m));
-    out.covariance_enu_m2 = R_ew.transpose() * tracked->position_covariance_m2 * R_ew;
-    out.velocity_covariance_enu = R_ew.transpose() * tracked->velocity_covariance_m2ps2 * R_ew;
-    out.clock_offset_s = seconds_between(tracked->time, rover.tag);
-    out.satellites = single_point_.used;
+    out.tag = rover.tag, out.time = tracked_.time;
+    out.status = tracked_.status == gnss::TrackStatus::coasted ? estimator::SolutionStatus::dr : estimator::SolutionStatus::spp;
+    out.position_e_m = tracked_.position_e_m, out.velocity_e_mps = tracked_.velocity_e_mps;
+    const Eigen::Matrix3d R_ew = geodesy::ecef_from_enu(geodesy::geodetic_from_ecef(tracked_.position_e_m));
+    out.covariance_enu_m2 = R_ew.transpose() * tracked_.position_covariance_m2 * R_ew;
+    out.velocity_covariance_enu = R_ew.transpose() * tracked_.velocity_covariance_m2ps2 * R_ew;
+    out.clock_offset_s = seconds_between(tracked_.time, rover.tag);
+    out.satellites = tracked_.single_point.used;
     out.verdict = ambiguity::ResolutionVerdict::off;
-    out.restarted = tracked->status == gnss::TrackStatus::started || tracked->status == gnss::TrackStatus::restarted;
+    out.restarted = tracked_.status == gnss::TrackStatus::started || tracked_.status == gnss::TrackStatus::restarted;
     return out;
   }
 
   gnss::SinglePointTracker tracker_;
   gnss::EphemerisStore<estimator::HostedCapacity::ephemerides> ephemerides_{};
-  gnss::SinglePointSolution single_point_{};
+  gnss::TrackedPosition tracked_{};
 };
 
 }  // namespace

@@ -60,6 +60,28 @@ TEST_CASE("Doppler velocity: exact Dopplers give velocity and drift, to 1 mm/s")
   });
 }
 
+TEST_CASE("Doppler velocity: one that is filled again holds nothing of the last, and is cleared when there is none") {
+  DopplerVelocity reused;
+  for_all_seeds(20, [&](Rng& rng) {
+    Scene s = random_scene(rng, 0.1);
+    s.epoch.satellites.resize(static_cast<std::size_t>(integer(rng, 4, 16)));
+    const Status status = solve_doppler_velocity(s.epoch, s.sky.store, s.receiver.p0_e_m, {}, {}, reused);
+    const auto fresh = solve_doppler_velocity(s.epoch, s.sky.store, s.receiver.p0_e_m);
+    REQUIRE(status.code == fresh.status().code);
+    CHECK(reused.velocity_e_mps == fresh->velocity_e_mps);
+    CHECK(reused.covariance == fresh->covariance);
+    CHECK(reused.used == fresh->used);
+    CHECK(reused.excluded == fresh->excluded);
+    REQUIRE(reused.rows.size() == fresh->rows.size());
+    for (std::size_t i = 0; i < reused.rows.size(); ++i) CHECK(reused.rows[i].residual_mps == fresh->rows[i].residual_mps);
+    s.epoch.satellites.resize(3);
+    CHECK(solve_doppler_velocity(s.epoch, s.sky.store, s.receiver.p0_e_m, {}, {}, reused).code == StatusCode::too_few);
+    CHECK(reused.rows.empty());
+    CHECK(reused.velocity_e_mps == Vector3d::Zero());
+    CHECK(reused.covariance.isZero(0));
+  });
+}
+
 TEST_CASE("Doppler velocity: a position error of 10 m is worth millimetres per second") {
   for_all_seeds(60, [](Rng& rng) {
     const Scene s = random_scene(rng);

@@ -8,7 +8,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -84,6 +86,18 @@ StatusCode code_of(const ObservationEpoch& epoch, const EphemerisStore<N>& store
   return solve_single_point(epoch, store, options).status().code;
 }
 
+/// The same to the last bit; nothing here is NaN.
+bool identical(const SinglePointSolution& a, const SinglePointSolution& b) {
+  const auto same_row = [](const CodeRow& p, const CodeRow& q) {
+    return p.satellite == q.satellite && p.signal == q.signal && p.fate == q.fate && p.residual_m == q.residual_m &&
+           p.sigma_m == q.sigma_m && p.corrected_m == q.corrected_m && p.elevation_rad == q.elevation_rad;
+  };
+  return a.time == b.time && a.position_e_m == b.position_e_m && a.state == b.state && a.covariance == b.covariance &&
+         a.clock_s == b.clock_s && a.constellation_used == b.constellation_used && a.used == b.used && a.excluded == b.excluded &&
+         a.gdop == b.gdop && a.chi_square == b.chi_square && a.redundancy == b.redundancy && a.consistent == b.consistent &&
+         std::equal(a.rows.begin(), a.rows.end(), b.rows.begin(), b.rows.end(), same_row);
+}
+
 }  // namespace
 
 TEST_CASE("single point: exact codes give the exact position, clock and time, from the centre of the Earth") {
@@ -118,6 +132,22 @@ TEST_CASE("single point: the start does not matter, nor the order of the satelli
     const auto shuffled = solve_single_point(s.epoch, s.sky.store);
     REQUIRE(shuffled);
     CHECK((shuffled->position_e_m - first->position_e_m).norm() < 1e-4);
+  });
+}
+
+TEST_CASE("single point: one that is filled again holds nothing of the last, and is cleared when there is none") {
+  const auto reused = std::make_unique<SinglePointSolution>();
+  for_all_seeds(20, [&](Rng& rng) {
+    Scene s = random_scene(rng, {integer(rng, 2, 6), integer(rng, 2, 5), integer(rng, 1, 4)});
+    add_noise(rng, s.epoch, 0.5);
+    static_cast<void>(make_late(rng, s.epoch, integer(rng, 0, 2)));
+    const Status status = solve_single_point(s.epoch, s.sky.store, {}, std::nullopt, *reused);
+    const auto fresh = solve_single_point(s.epoch, s.sky.store);
+    REQUIRE(status.code == fresh.status().code);
+    CHECK(identical(*reused, *fresh));
+    s.epoch.satellites.resize(3);
+    CHECK(solve_single_point(s.epoch, s.sky.store, {}, std::nullopt, *reused).code == StatusCode::too_few);
+    CHECK(identical(*reused, SinglePointSolution{}));
   });
 }
 

@@ -153,16 +153,27 @@ TEST_CASE("tracker: epochs out of order change nothing; reruns are bit-identical
   Rng rng{8};
   const Drive drive{rng};
   SinglePointTracker first, second;
-  for (int k = 0; k < 10; ++k) {
-    const ObservationEpoch e = drive.epoch(rng, k);
+  TrackedPosition b;  // filled again and again
+  for (int k = 0; k < 14; ++k) {
+    ObservationEpoch e = drive.epoch(rng, k);
+    if (k == 10 || k == 11) e.satellites.clear();  // coasts
     const auto a = first.update(e, drive.sky.store);
     CHECK(first.update(e, drive.sky.store).status().code == StatusCode::out_of_order);
-    const auto b = second.update(e, drive.sky.store);
+    REQUIRE(second.update(e, drive.sky.store, b));
     REQUIRE(a);
-    CHECK(a->position_e_m == b->position_e_m);
-    CHECK(a->position_covariance_m2 == b->position_covariance_m2);
-    CHECK(a->time == b->time);
+    CHECK(a->position_e_m == b.position_e_m);
+    CHECK(a->position_covariance_m2 == b.position_covariance_m2);
+    CHECK(a->velocity_e_mps == b.velocity_e_mps);
+    CHECK(a->time == b.time);
+    CHECK(a->status == b.status);
+    CHECK(a->doppler_used == b.doppler_used);
+    CHECK(a->single_point.used == b.single_point.used);
+    CHECK(a->single_point.rows.size() == b.single_point.rows.size());
+    CHECK(b.single_point.rows.empty() == e.satellites.empty());
   }
+  CHECK(second.update(drive.epoch(rng, 3), drive.sky.store, b).code == StatusCode::out_of_order);
+  CHECK(b.single_point.rows.empty());
+  CHECK(b.position_e_m == Vector3d::Zero());
   CHECK(first.update({}, drive.sky.store).status().code == StatusCode::out_of_order);
   first.reset();
   CHECK_FALSE(first.running());

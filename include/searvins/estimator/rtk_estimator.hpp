@@ -92,8 +92,9 @@ class RtkEstimator {
   Result<RtkSolution> update(const gnss::ObservationEpoch& rover) {
     if (started_ && rover.tag <= last_tag_)
       return failure(rover.tag == last_tag_ ? StatusCode::duplicate : StatusCode::out_of_order, "rover epoch not after the last one", -1, -1, seconds_between(last_tag_, rover.tag));
-    const Result<gnss::TrackedPosition> tracked = tracker_.update(rover, ephemerides_);
-    if (!tracked.ok() && !has_state_) return tracked.status();
+    const Status found = tracker_.update(rover, ephemerides_, tracked_);
+    if (!found.ok() && !has_state_) return found;
+    const gnss::TrackedPosition* const tracked = found.ok() ? &tracked_ : nullptr;
     RtkSolution out = begin(rover, tracked);
     started_ = true, last_tag_ = rover.tag;
     const Status differenced = difference(rover, tracked, out);
@@ -170,8 +171,8 @@ class RtkEstimator {
 
   /// The differenced epoch of the last update, for reports.
   [[nodiscard]] const gnss::DifferencedEpoch& differenced() const { return epoch_; }
-  /// Single-point solution rows of the last update, for reports (empty when it coasted).
-  [[nodiscard]] const gnss::SinglePointSolution& single_point() const { return single_point_; }
+  /// Single-point solution rows of the last update, for reports (empty when it coasted, or found no position).
+  [[nodiscard]] const gnss::SinglePointSolution& single_point() const { return tracked_.single_point; }
   [[nodiscard]] const Smoother& smoother() const { return smoother_; }
   [[nodiscard]] const RtkOptions& options() const { return options_; }
   /// The local frame of the window: East-North-Up where it was started.
@@ -231,8 +232,8 @@ class RtkEstimator {
     out.time = time, out.tag = time.plus_seconds(clock_offset_s_);
     out.clock_offset_s = clock_offset_s_;
     out.source = source;
-    single_point_ = {};
-    predict(failure(StatusCode::no_data, "no rover epoch"), out);
+    tracked_.clear();
+    predict(nullptr, out);
     drop_differences(), epoch_.doppler.clear(), epoch_.doppler_pivot = -1, is_undifferenced_ = false;
     const bool is_frame = source == SolutionSource::camera;
     if (!is_frame) continuation_.skip_epoch();
@@ -242,24 +243,20 @@ class RtkEstimator {
       is_frame ? estimate_frame(out) : estimate(out);
       if (out.status == SolutionStatus::dr) out.status = nodes_.empty() ? SolutionStatus::dr : measured;
     } else {
-      without_differences(failure(StatusCode::no_data, "no rover epoch"), out);
+      without_differences(nullptr, out);
     }
     return out;
   }
 
   // ---- begin: time and prediction --------------------------------------------------------------------------------------------------------
 
-  [[nodiscard]] RtkSolution begin(const gnss::ObservationEpoch& rover, const Result<gnss::TrackedPosition>& tracked) {
+  /// Here and below, `tracked` is nullptr where the tracker found no position.
+  [[nodiscard]] RtkSolution begin(const gnss::ObservationEpoch& rover, const gnss::TrackedPosition* tracked) {
     RtkSolution out;
     out.tag = rover.tag;
-    if (tracked.ok()) {
-      single_point_ = tracked->single_point;
-      clock_offset_s_ = seconds_between(tracked->time, rover.tag);
-    } else {
-      single_point_ = {};
-    }
+    if (tracked) clock_offset_s_ = seconds_between(tracked->time, rover.tag);
     out.clock_offset_s = clock_offset_s_;
-    out.time = tracked.ok() ? tracked->time : rover.tag.plus_seconds(-clock_offset_s_);
+    out.time = tracked ? tracked->time : rover.tag.plus_seconds(-clock_offset_s_);
     if (window_running() && !Motion::is_inertial && since_last(out) > options_.max_gap_s) restart();
     return out;
   }
@@ -275,8 +272,8 @@ class RtkEstimator {
   static constexpr double kTrustedPredictionS = 2.5;
 
   /// Where the epoch probably is, before its differences are looked at, with a sigma.
-  void predict(const Result<gnss::TrackedPosition>& tracked, const RtkSolution& out) {
-    const bool trusted = Motion::is_inertial || (window_running() && since_last(out) <= kTrustedPredictionS) || !tracked.ok();
+  void predict(const gnss::TrackedPosition* tracked, const RtkSolution& out) {
+    const bool trusted = Motion::is_inertial || (window_running() && since_last(out) <= kTrustedPredictionS) || !tracked;
     is_predicted_ = false;
     if (has_state_ && trusted && since_last(out) > 0) {
       if (const auto x = motion_.predict(last_state_, last_time_, out.time); x.ok()) {
@@ -291,7 +288,7 @@ class RtkEstimator {
         return;
       }
     }
-    if (!tracked.ok()) return;  // the last prediction stands
+    if (!tracked) return;  // the last prediction stands
     predicted_e_m_ = tracked->position_e_m;
     predicted_v_e_mps_ = tracked->velocity_e_mps;
     const Matrix3& covariance_m2 = tracked->position_covariance_m2;
@@ -300,7 +297,7 @@ class RtkEstimator {
 
   // ---- difference ------------------------------------------------------------------------------------------------------------------------
 
-  Status difference(const gnss::ObservationEpoch& rover, const Result<gnss::TrackedPosition>& tracked, RtkSolution& out) {
+  Status difference(const gnss::ObservationEpoch& rover, const gnss::TrackedPosition* tracked, RtkSolution& out) {
     predict(tracked, out);
     const Status s = differencer_.difference(rover, base_, ephemerides_, predicted_e_m_, options_.differencing, epoch_, moved_since_compared(out));
     if (!s.ok()) return s;
@@ -334,10 +331,10 @@ class RtkEstimator {
   }
 
   /// Without double differences: the better of prediction and single point, said so.
-  void without_differences(const Result<gnss::TrackedPosition>& tracked, RtkSolution& out) {
-    out.satellites = tracked.ok() ? single_point_.used : 0;
+  void without_differences(const gnss::TrackedPosition* tracked, RtkSolution& out) {
+    out.satellites = tracked ? tracked->single_point.used : 0;
     out.status = SolutionStatus::dr;
-    if (tracked.ok()) {
+    if (tracked) {
       if (tracked->status != gnss::TrackStatus::coasted) out.status = SolutionStatus::spp;
       set_from_tracker(*tracked, out);
     } else {
@@ -1020,7 +1017,7 @@ class RtkEstimator {
   gnss::BaseBuffer<Cap::base_epochs> base_{};
   gnss::Differencer differencer_{};
   gnss::DifferencedEpoch epoch_{};
-  gnss::SinglePointSolution single_point_{};
+  gnss::TrackedPosition tracked_{};  ///< of the epoch at hand
   gnss::SinglePointSolution undifferenced_codes_{};  ///< room to work in
   Smoother smoother_{};
   ambiguity::Continuation<AmbiguityKey, 2 * kPhasesSize> continuation_{};

@@ -99,20 +99,30 @@ struct DopplerMeasurement {
   double cn0_dbhz{kMissing};
 };
 
-/// Everything differencing knows of one epoch.
-struct DifferencedEpoch {
+/// What differencing says of an epoch besides its lists.
+struct DifferencedEpochFacts {
   GpsTime rover_tag{};
   Status base_status{};  ///< ok, or why there are no single differences (no base data, too old); Doppler is there all the same
   double base_age_s{0};  ///< rover tag minus tag of the base epoch
   bool base_interpolated{false};
+  int doppler_pivot{-1};                              ///< index of the highest, -1 when empty
+  MotionFit motion{};                                 ///< what the common-motion test found
+  int satellites{0};                                  ///< distinct satellites in `signals`
+  std::array<std::uint16_t, kRejections> rejected{};  ///< how many, by reason
+};
+
+/// Everything differencing knows of one epoch. Some 30 kB: where a stack is small, keep one and have it filled.
+struct DifferencedEpoch : DifferencedEpochFacts {
   StaticVector<CorrectedSignal, kMaxCorrectedSignals> signals{};  ///< by satellite, then in the order of the pairs
   StaticVector<SignalGroup, kMaxSignalGroups> groups{};
   StaticVector<DopplerMeasurement, kMaxSatellitesPerEpoch> doppler{};
-  int doppler_pivot{-1};                                           ///< index of the highest, -1 when empty
-  MotionFit motion{};                                              ///< what the common-motion test found
-  int satellites{0};                                               ///< distinct satellites in `signals`
-  std::array<std::uint16_t, kRejections> rejected{};               ///< how many, by reason
-  StaticVector<RejectedSignal, kMaxRejectedSignals> rejections{};  ///< which, as far as they fit
+  StaticVector<RejectedSignal, kMaxRejectedSignals> rejections{};  ///< which were rejected, as far as they fit
+
+  /// As it was made, without another one beside it.
+  void clear() {
+    static_cast<DifferencedEpochFacts&>(*this) = {};
+    signals.clear(), groups.clear(), doppler.clear(), rejections.clear();
+  }
 
   /// Counts a rejection and lists it.
   void reject(SatelliteId satellite, const SignalCode& signal, Rejection reason) {

@@ -70,22 +70,33 @@ using DopplerRow = BasicDopplerRow<double>;  ///< in double precision
 
 inline constexpr std::size_t kMaxDopplerRows = 2 * kMaxSatellitesPerEpoch;  ///< Dopplers of one solution
 
-/// Velocity and drift of one epoch.
+/// What a solution says besides its rows.
 template <class Scalar>
-struct BasicDopplerVelocity {
+struct BasicDopplerEstimate {
   using Vector3 = math::Vector3<Scalar>;
   using Covariance = Eigen::Matrix<Scalar, 4, 4, Eigen::DontAlign>;
 
   Vector3 velocity_e_mps{Vector3::Zero()};
   double drift_mps{0};                        ///< c times the rate of the receiver clock
   Covariance covariance{Covariance::Zero()};  ///< of (velocity, drift); scaled up when the chi-square test fails
-  StaticVector<BasicDopplerRow<Scalar>, kMaxDopplerRows> rows{};
   int used{0}, excluded{0};
   double chi_square{0};
   int redundancy{0};
   bool consistent{false};  ///< the chi-square test was passed, with redundancy
 
   [[nodiscard]] math::Matrix3<Scalar> velocity_covariance_m2ps2() const { return covariance.template topLeftCorner<3, 3>(); }
+};
+
+/// Velocity and drift of one epoch. Some 10 kB: where a stack is small, keep one and have it filled.
+template <class Scalar>
+struct BasicDopplerVelocity : BasicDopplerEstimate<Scalar> {
+  StaticVector<BasicDopplerRow<Scalar>, kMaxDopplerRows> rows{};
+
+  /// As it was made, without another one beside it.
+  void clear() {
+    static_cast<BasicDopplerEstimate<Scalar>&>(*this) = {};
+    rows.clear();
+  }
 };
 
 using DopplerVelocity = BasicDopplerVelocity<double>;  ///< in double precision
@@ -194,19 +205,11 @@ template <class Scalar>
   }
 }
 
-}  // namespace detail
-
-/// Velocity at an epoch whose position is roughly known. Every Doppler that passes the screens takes part, up to two carriers a
-/// satellite. A prior with zero information (the default) is none. Errors: non_finite (position), too_few (fewer than four range rates,
-/// or than four that agree), under_determined (geometry).
-template <class Scalar = double, std::size_t N>
-[[nodiscard]] Result<BasicDopplerVelocity<Scalar>> solve_doppler_velocity(const ObservationEpoch& epoch, const EphemerisStore<N>& store,
-                                                                          const math::Vector3<Scalar>& position_e_m,
-                                                                          const DopplerOptions& options = {},
-                                                                          const VelocityPrior& prior = {}) {
+/// The range rates of an epoch that pass the screens, up to two carriers a satellite.
+template <class Scalar, std::size_t N>
+void collect_range_rates(const ObservationEpoch& epoch, const EphemerisStore<N>& store, const math::Vector3<Scalar>& position_e_m,
+                         const DopplerOptions& options, BasicDopplerVelocity<Scalar>& d) {
   using Vector3 = math::Vector3<Scalar>;
-  if (!position_e_m.allFinite()) return failure(StatusCode::non_finite, "Doppler velocity: position is not finite");
-  BasicDopplerVelocity<Scalar> d;
   for (const SatelliteObservation& s : epoch.satellites) {
     std::array<char, 2> bands{};
     std::size_t taken = 0;
@@ -227,19 +230,51 @@ template <class Scalar = double, std::size_t N>
       if (d.rows.push_back(r)) bands[taken++] = o.signal.band;
     }
   }
+}
+
+/// The velocity from the rows of `d`; the rest of `d` is filled when that succeeds.
+template <class Scalar>
+[[nodiscard]] inline Status velocity_from_range_rates(const DopplerOptions& options, const VelocityPrior& prior,
+                                                      BasicDopplerVelocity<Scalar>& d) {
   if (d.rows.size() < 4)
     return failure(StatusCode::too_few, "Doppler velocity: fewer than four range rates", static_cast<int>(d.rows.size()), 4);
-
   Eigen::Matrix<Scalar, 4, 1> x;
-  if (!detail::best_doppler(d, prior, x))
+  if (!best_doppler(d, prior, x))
     return failure(StatusCode::under_determined, "Doppler velocity: the satellites do not determine a velocity");
-  if (const Status s = detail::exclude_doppler_outliers(options, prior, d, x); !s) return s;
+  if (const Status s = exclude_doppler_outliers(options, prior, d, x); !s) return s;
   for (auto& r : d.rows) r.residual_mps = r.rate_mps - r.direction.dot(x);
   d.excluded = static_cast<int>(d.rows.size()) - d.used;
   if (!d.consistent && d.redundancy > 0) d.covariance *= std::max(1.0, d.chi_square / d.redundancy);
   d.velocity_e_mps = x.template head<3>();
   d.drift_mps = x[3];
-  return d;
+  return ok_status();
+}
+
+}  // namespace detail
+
+/// Velocity at an epoch whose position is roughly known, into `out`. Every Doppler that passes the screens takes part, up to two carriers
+/// a satellite. A prior with zero information is none. Errors, `out` cleared: non_finite (position), too_few (fewer than four range
+/// rates, or than four that agree), under_determined (geometry).
+template <class Scalar, std::size_t N>
+Status solve_doppler_velocity(const ObservationEpoch& epoch, const EphemerisStore<N>& store, const math::Vector3<Scalar>& position_e_m,
+                              const DopplerOptions& options, const VelocityPrior& prior, BasicDopplerVelocity<Scalar>& out) {
+  out.clear();
+  if (!position_e_m.allFinite()) return failure(StatusCode::non_finite, "Doppler velocity: position is not finite");
+  detail::collect_range_rates(epoch, store, position_e_m, options, out);
+  const Status s = detail::velocity_from_range_rates(options, prior, out);
+  if (!s) out.clear();
+  return s;
+}
+
+/// The same by value: some 10 kB, several times on its way.
+template <class Scalar = double, std::size_t N>
+[[nodiscard]] Result<BasicDopplerVelocity<Scalar>> solve_doppler_velocity(const ObservationEpoch& epoch, const EphemerisStore<N>& store,
+                                                                          const math::Vector3<Scalar>& position_e_m,
+                                                                          const DopplerOptions& options = {},
+                                                                          const VelocityPrior& prior = {}) {
+  BasicDopplerVelocity<Scalar> out;
+  if (const Status s = solve_doppler_velocity(epoch, store, position_e_m, options, prior, out); !s) return s;
+  return out;
 }
 
 }  // namespace searvins::gnss

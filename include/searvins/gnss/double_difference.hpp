@@ -74,7 +74,7 @@ class BasicDifferencer {
   Status difference(const ObservationEpoch& rover, const BaseBuffer<B>& base, const EphemerisStore<E>& store,
                     const Vector3& predicted_rover_e_m, const DifferencingOptions& options, DifferencedEpoch& out,
                     const std::optional<PredictedDisplacement>& moved = {}) {
-    out = DifferencedEpoch{};
+    out.clear();
     out.rover_tag = rover.tag;
     if (const Status s = check(rover, predicted_rover_e_m); !s) return s;
 

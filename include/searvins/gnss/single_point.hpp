@@ -165,16 +165,10 @@ template <class Scalar>
   return ok_status();
 }
 
-}  // namespace detail
-
-/// Position of one receiver at one epoch. Without prior at least four usable codes are needed, with a prior one.
-/// Errors: invalid_argument (an option or the prior out of its domain), no_data (no usable code), too_few (not enough codes, or not
-/// enough that agree: `index` there, `detail` needed), under_determined (geometry), rejected (not near the Earth). A solution that
-/// fails its own chi-square test is returned with consistent = false and a covariance scaled up by the test. Scalar: double or wider.
-template <class Scalar = double, std::size_t N>
-[[nodiscard]] Result<BasicSinglePointSolution<Scalar>> solve_single_point(
-    const ObservationEpoch& epoch, const EphemerisStore<N>& store, const SinglePointOptions& options = {},
-    const std::type_identity_t<std::optional<BasicSinglePointPrior<Scalar>>>& prior = std::nullopt) {
+/// Whether options and prior are within their domains.
+template <class Scalar>
+[[nodiscard]] inline Status check_single_point(const SinglePointOptions& options,
+                                               const std::optional<BasicSinglePointPrior<Scalar>>& prior) {
   if (options.codes_per_satellite < 1 || options.codes_per_satellite > kCodesPerSatellite)
     return failure(StatusCode::invalid_argument, "single point: codes_per_satellite outside its range");
   if (!(options.outlier_sigmas > 0 && options.data_information_scale > 0 && options.late_factor >= 1 && options.cn0_decade_db > 0))
@@ -189,10 +183,13 @@ template <class Scalar = double, std::size_t N>
   const math::Vector3<Scalar> start_e_m = options.start_e_m;
   if (!start_e_m.allFinite() || (prior && !(prior->mean.allFinite() && prior->information.allFinite())))
     return failure(StatusCode::invalid_argument, "single point: start or prior is not finite");
+  return ok_status();
+}
 
-  BasicSinglePointSolution<Scalar> out;
-  detail::BasicSinglePointProblem<Scalar> problem(options, prior, out);
-  problem.collect(epoch, store);
+/// The position from the rows that `problem` has collected into `out`; the rest of `out` is filled when that succeeds.
+template <class Scalar>
+[[nodiscard]] inline Status locate(BasicSinglePointProblem<Scalar>& problem, GpsTime tag, const SinglePointOptions& options,
+                                   const std::optional<BasicSinglePointPrior<Scalar>>& prior, BasicSinglePointSolution<Scalar>& out) {
   if (problem.candidates() == 0) return failure(StatusCode::no_data, "single point: no satellite with a usable code and an ephemeris");
   if (problem.redundancy() < 0) return failure(StatusCode::too_few, "single point: fewer codes than unknowns", problem.candidates(), 4);
 
@@ -200,17 +197,48 @@ template <class Scalar = double, std::size_t N>
   if (prior) {
     x = prior->mean;
     problem.place(x.template head<3>());
-    detail::start_clocks(problem, out, *prior, x);
+    start_clocks(problem, out, *prior, x);
   } else {
-    if (const Status s = detail::start_from_codes(problem, options, x); !s) return s;
+    if (const Status s = start_from_codes(problem, options, x); !s) return s;
     problem.place(x.template head<3>());
   }
   if (problem.redundancy() < 0)
     return failure(StatusCode::too_few, "single point: fewer codes above the elevation mask than unknowns", problem.candidates(), 4);
-  if (!std::isfinite(detail::best_descent(problem, x)))
+  if (!std::isfinite(best_descent(problem, x)))
     return failure(StatusCode::under_determined, "single point: the satellites do not determine a position");
-  if (const Status s = detail::exclude_outliers(problem, options, x, out); !s) return s;
-  detail::report(problem, epoch.tag, x, out);
+  if (const Status s = exclude_outliers(problem, options, x, out); !s) return s;
+  report(problem, tag, x, out);
+  return ok_status();
+}
+
+}  // namespace detail
+
+/// Position of one receiver at one epoch, into `out`. Without prior at least four usable codes are needed, with a prior one.
+/// Errors, `out` cleared: invalid_argument (an option or the prior out of its domain), no_data (no usable code), too_few (not enough
+/// codes, or not enough that agree: `index` there, `detail` needed), under_determined (geometry), rejected (not near the Earth). A
+/// solution that fails its own chi-square test is given with consistent = false and a covariance scaled up by the test.
+/// Scalar: double or wider.
+template <class Scalar, std::size_t N>
+Status solve_single_point(const ObservationEpoch& epoch, const EphemerisStore<N>& store, const SinglePointOptions& options,
+                          const std::type_identity_t<std::optional<BasicSinglePointPrior<Scalar>>>& prior,
+                          BasicSinglePointSolution<Scalar>& out) {
+  out.clear();
+  Status s = detail::check_single_point<Scalar>(options, prior);
+  if (!s) return s;
+  detail::BasicSinglePointProblem<Scalar> problem(options, prior, out);
+  problem.collect(epoch, store);
+  s = detail::locate(problem, epoch.tag, options, prior, out);
+  if (!s) out.clear();
+  return s;
+}
+
+/// The same by value: some 20 kB, several times on its way.
+template <class Scalar = double, std::size_t N>
+[[nodiscard]] Result<BasicSinglePointSolution<Scalar>> solve_single_point(
+    const ObservationEpoch& epoch, const EphemerisStore<N>& store, const SinglePointOptions& options = {},
+    const std::type_identity_t<std::optional<BasicSinglePointPrior<Scalar>>>& prior = std::nullopt) {
+  BasicSinglePointSolution<Scalar> out;
+  if (const Status s = solve_single_point(epoch, store, options, prior, out); !s) return s;
   return out;
 }
 

@@ -106,9 +106,9 @@ struct CodeRow {
   double residual_m{0};  ///< corrected - modelled, at the solution; positive: late
 };
 
-/// Result of one epoch.
+/// What a solution says besides its rows.
 template <class Scalar>
-struct BasicSinglePointSolution {
+struct BasicSinglePointEstimate {
   using Vector3 = math::Vector3<Scalar>;
   using Vector = BasicSinglePointVector<Scalar>;
   using Matrix = BasicSinglePointMatrix<Scalar>;
@@ -119,14 +119,25 @@ struct BasicSinglePointSolution {
   Matrix covariance{Matrix::Zero()};              ///< of state; scaled up by the chi-square test when that fails
   std::array<double, kConstellations> clock_s{};  ///< receiver tag minus system time
   std::array<bool, kConstellations> constellation_used{};
-  StaticVector<CodeRow, kMaxCodeRows> rows{};  ///< one for every code tried, and one for a satellite without code
-  int used{0}, excluded{0};                    ///< rows in the solution; rows found to be outliers
-  double gdop{0};                              ///< sqrt trace of the unweighted cofactor of position and clocks
-  double chi_square{0};                        ///< weighted square sum of used rows and prior
+  int used{0}, excluded{0};  ///< rows in the solution; rows found to be outliers
+  double gdop{0};            ///< sqrt trace of the unweighted cofactor of position and clocks
+  double chi_square{0};      ///< weighted square sum of used rows and prior
   int redundancy{0};
   bool consistent{false};  ///< the chi-square test was passed, with redundancy
 
   [[nodiscard]] math::Matrix3<Scalar> position_covariance_m2() const { return covariance.template topLeftCorner<3, 3>(); }
+};
+
+/// Result of one epoch. Some 20 kB: where a stack is small, keep one and have it filled.
+template <class Scalar>
+struct BasicSinglePointSolution : BasicSinglePointEstimate<Scalar> {
+  StaticVector<CodeRow, kMaxCodeRows> rows{};  ///< one for every code tried, and one for a satellite without code
+
+  /// As it was made, without another one beside it.
+  void clear() {
+    static_cast<BasicSinglePointEstimate<Scalar>&>(*this) = {};
+    rows.clear();
+  }
 };
 
 using SinglePointSolution = BasicSinglePointSolution<double>;  ///< in double precision

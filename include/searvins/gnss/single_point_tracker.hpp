@@ -66,9 +66,9 @@ enum class TrackStatus : std::uint8_t {
   restarted,  ///< contradicted several times: from codes alone
 };
 
-/// One epoch of the filter. Scalar: double or wider.
+/// What the filter says of an epoch besides the rows of its codes. Scalar: double or wider.
 template <class Scalar>
-struct BasicTrackedPosition {
+struct BasicTrackedEstimate {
   using Vector3 = math::Vector3<Scalar>;
   using Matrix3 = math::Matrix3<Scalar>;
 
@@ -79,8 +79,19 @@ struct BasicTrackedPosition {
   Matrix3 position_covariance_m2{Matrix3::Zero()};
   Matrix3 velocity_covariance_m2ps2{Matrix3::Zero()};
   bool doppler_used{false};
-  int doubts{0};                                    ///< consecutive contradictions so far
+  int doubts{0};  ///< consecutive contradictions so far
+};
+
+/// One epoch of the filter. Some 20 kB: where a stack is small, keep one and have it filled.
+template <class Scalar>
+struct BasicTrackedPosition : BasicTrackedEstimate<Scalar> {
   BasicSinglePointSolution<Scalar> single_point{};  ///< rows, residuals and clocks of this epoch; empty when coasted
+
+  /// As it was made, without another one beside it.
+  void clear() {
+    static_cast<BasicTrackedEstimate<Scalar>&>(*this) = {};
+    single_point.clear();
+  }
 };
 
 using TrackedPosition = BasicTrackedPosition<double>;  ///< in double precision
@@ -94,37 +105,45 @@ class BasicSinglePointTracker {
   explicit BasicSinglePointTracker(const TrackerOptions& options = {}) : options_(options) {}
 
   /// Forgets everything.
-  void reset() { *this = BasicSinglePointTracker(options_); }
+  void reset() { running_ = false; }
   [[nodiscard]] bool running() const { return running_; }
 
-  /// Takes one epoch. Errors: out_of_order (tag not after the last one; nothing is changed); those of solve_single_point while there
-  /// is nothing to track; stale (no usable code for max_gap_s: the filter has forgotten its state).
+  /// Takes one epoch and fills `out`. Errors, `out` cleared: out_of_order (tag not after the last one; nothing is changed); those of
+  /// solve_single_point while there is nothing to track; stale (no usable code for max_gap_s: the filter has forgotten its state).
   template <std::size_t N>
-  [[nodiscard]] Result<Position> update(const ObservationEpoch& epoch, const EphemerisStore<N>& store) {
-    if (!running_) return start(epoch, store, TrackStatus::started);
+  Status update(const ObservationEpoch& epoch, const EphemerisStore<N>& store, Position& out) {
+    out.clear();
+    if (!running_) return start(epoch, store, TrackStatus::started, out);
     const double dt_s = seconds_between(tag_, epoch.tag);
     if (!(dt_s > 0)) return failure(StatusCode::out_of_order, "tracker: epoch not after the last one", -1, -1, dt_s);
-    if (dt_s > options_.max_gap_s) return start(epoch, store, TrackStatus::started);
+    if (dt_s > options_.max_gap_s) return start(epoch, store, TrackStatus::started, out);
     predict(dt_s);
     tag_ = epoch.tag;
-    Position out;
     out.doppler_used = absorb_doppler(epoch, store);
 
     SinglePointOptions options = options_.single_point;
     options.data_information_scale *= std::min(1.0, dt_s / options_.correlation_s);
     const std::optional<Prior> prior = position_prior();
-    if (!prior) return start(epoch, store, TrackStatus::restarted);
-    const Result<Solution> with_prior = solve_single_point<Scalar>(epoch, store, options, prior);
-    const bool contradicted = contradicts(epoch, store, with_prior);
+    if (!prior) return start(epoch, store, TrackStatus::restarted, out);
+    const Status located = solve_single_point(epoch, store, options, prior, out.single_point);
+    const bool contradicted = contradicts(epoch, store, out.single_point);
     doubts_ = contradicted ? doubts_ + 1 : 0;
-    if (doubts_ >= options_.doubts_until_restart) return start(epoch, store, TrackStatus::restarted);
-    if (!with_prior) return coast(with_prior.status(), dt_s, contradicted, out);
+    if (doubts_ >= options_.doubts_until_restart) return start(epoch, store, TrackStatus::restarted, out);
+    if (!located) return coast(located, dt_s, contradicted, out);
     coasting_s_ = 0;
     out.status = contradicted ? TrackStatus::doubtful : TrackStatus::tracked;
-    absorb_position(*prior, *with_prior);
-    out.single_point = *with_prior;
-    out.time = with_prior->time;
-    return filled(out);
+    absorb_position(*prior, out.single_point);
+    out.time = out.single_point.time;
+    fill(out);
+    return ok_status();
+  }
+
+  /// The same by value: some 20 kB, several times on its way.
+  template <std::size_t N>
+  [[nodiscard]] Result<Position> update(const ObservationEpoch& epoch, const EphemerisStore<N>& store) {
+    Position out;
+    if (const Status s = update(epoch, store, out); !s) return s;
+    return out;
   }
 
  private:
@@ -138,23 +157,24 @@ class BasicSinglePointTracker {
   using Solution = BasicSinglePointSolution<Scalar>;
 
   template <std::size_t N>
-  [[nodiscard]] Result<Position> start(const ObservationEpoch& epoch, const EphemerisStore<N>& store, TrackStatus status) {
+  [[nodiscard]] Status start(const ObservationEpoch& epoch, const EphemerisStore<N>& store, TrackStatus status, Position& out) {
     running_ = false;
-    const Result<Solution> s = solve_single_point<Scalar>(epoch, store, options_.single_point);
-    if (!s) return s.status();
+    out.clear();
+    const Solution& s = out.single_point;
+    if (const Status located = solve_single_point(epoch, store, options_.single_point, std::nullopt, out.single_point); !located)
+      return located;
     x_.setZero();
     P_.setZero();
-    x_.template tail<kSinglePointUnknowns>() = s->state;
-    P_.template bottomRightCorner<kSinglePointUnknowns, kSinglePointUnknowns>() = s->covariance;
+    x_.template tail<kSinglePointUnknowns>() = s.state;
+    P_.template bottomRightCorner<kSinglePointUnknowns, kSinglePointUnknowns>() = s.covariance;
     P_.diagonal().template segment<3>(3).array() += options_.start_sigma_m * options_.start_sigma_m;
     P_.diagonal().template head<3>().setConstant(kStartSpeedMps * kStartSpeedMps);
     tag_ = epoch.tag, running_ = true, doubts_ = 0, coasting_s_ = 0;
-    Position out;
     out.status = status;
     out.doppler_used = absorb_doppler(epoch, store);
-    out.single_point = *s;
-    out.time = s->time;
-    return filled(out);
+    out.time = s.time;
+    fill(out);
+    return ok_status();
   }
 
   void predict(double dt_s) {
@@ -178,14 +198,14 @@ class BasicSinglePointTracker {
     const math::SmallCholesky<3, Scalar> factor(P_.template topLeftCorner<3, 3>());
     if (!factor.ok()) return false;
     const Matrix3 information = factor.inverse();
-    const Result<BasicDopplerVelocity<Scalar>> d = solve_doppler_velocity<Scalar>(epoch, store, x_.template segment<3>(3), options_.doppler,
-                                                                                  VelocityPrior{x_.template head<3>(), information});
-    if (!d || !d->consistent) return false;
-    Matrix3 after = d->velocity_covariance_m2ps2();
+    const VelocityPrior prior{x_.template head<3>(), information};
+    const BasicDopplerVelocity<Scalar>& d = doppler_;
+    if (!solve_doppler_velocity(epoch, store, x_.template segment<3>(3), options_.doppler, prior, doppler_) || !d.consistent) return false;
+    Matrix3 after = d.velocity_covariance_m2ps2();
     after.diagonal().array() += options_.doppler_floor_mps * options_.doppler_floor_mps;
     const Eigen::Matrix<Scalar, kSize, 3> gain = P_.template leftCols<3>().lazyProduct(information);
     const Matrix3 shrink = P_.template topLeftCorner<3, 3>() - after;
-    const Vector3 change_mps = d->velocity_e_mps - x_.template head<3>();
+    const Vector3 change_mps = d.velocity_e_mps - x_.template head<3>();
     x_ += gain.lazyProduct(change_mps);
     const Eigen::Matrix<Scalar, kSize, 3> shrunk = gain.lazyProduct(shrink);
     P_ -= shrunk.lazyProduct(gain.transpose());
@@ -222,40 +242,43 @@ class BasicSinglePointTracker {
     symmetrise();
   }
 
-  /// Do the codes alone, with clearly more satellites than agree with the prediction, put the receiver somewhere else?
+  /// Do the codes alone, with clearly more satellites than agree with the prediction, put the receiver somewhere else? `with_prior` is empty
+  /// when none agree.
   template <std::size_t N>
-  [[nodiscard]] bool contradicts(const ObservationEpoch& epoch, const EphemerisStore<N>& store, const Result<Solution>& with_prior) const {
-    const int agreeing = with_prior ? with_prior->used : 0;
-    if (with_prior && with_prior->consistent && agreeing >= with_prior->excluded) return false;
-    const Result<Solution> alone = solve_single_point<Scalar>(epoch, store, options_.single_point);
-    if (!alone || !alone->consistent || 4 * alone->used <= 5 * agreeing) return false;
-    const Matrix3 sum = alone->position_covariance_m2() + P_.template block<3, 3>(3, 3);
+  [[nodiscard]] bool contradicts(const ObservationEpoch& epoch, const EphemerisStore<N>& store, const Solution& with_prior) {
+    const int agreeing = with_prior.used;
+    if (with_prior.consistent && agreeing >= with_prior.excluded) return false;
+    const Solution& alone = alone_;
+    if (!solve_single_point(epoch, store, options_.single_point, std::nullopt, alone_)) return false;
+    if (!alone.consistent || 4 * alone.used <= 5 * agreeing) return false;
+    const Matrix3 sum = alone.position_covariance_m2() + P_.template block<3, 3>(3, 3);
     const math::SmallCholesky<3, Scalar> factor(sum);
     if (!factor.ok()) return false;
-    const Vector3 apart_m = alone->position_e_m - x_.template segment<3>(3);
+    const Vector3 apart_m = alone.position_e_m - x_.template segment<3>(3);
     const Result<double> bound = math::chi_square_threshold(options_.doubt_false_alarm, 3);
     return bound && apart_m.dot(factor.solve(apart_m)) > *bound;
   }
 
-  [[nodiscard]] Result<Position> coast(const Status& why, double dt_s, bool contradicted, Position& out) {
+  [[nodiscard]] Status coast(const Status& why, double dt_s, bool contradicted, Position& out) {
     coasting_s_ += dt_s;
     if (coasting_s_ > options_.max_gap_s) {
       running_ = false;
+      out.clear();
       return failure(StatusCode::stale, why.what, -1, -1, coasting_s_);
     }
     out.status = contradicted ? TrackStatus::doubtful : TrackStatus::coasted;
     out.time = tag_.plus_seconds(-x_.template segment<kSinglePointClocks>(6).mean() / kSpeedOfLightMps);
-    return filled(out);
+    fill(out);
+    return ok_status();
   }
 
-  [[nodiscard]] Position filled(Position& out) const {
+  void fill(Position& out) const {
     out.position_e_m = x_.template segment<3>(3);
     out.velocity_e_mps = x_.template head<3>();
     out.position_covariance_m2 = P_.template block<3, 3>(3, 3);
     out.position_covariance_m2.diagonal().array() += options_.systematic_sigma_m * options_.systematic_sigma_m;
     out.velocity_covariance_m2ps2 = P_.template topLeftCorner<3, 3>();
     out.doubts = doubts_;
-    return out;
   }
 
   void symmetrise() { P_ = (0.5 * (P_ + P_.transpose())).eval(); }
@@ -269,6 +292,8 @@ class BasicSinglePointTracker {
   double coasting_s_{0};
   int doubts_{0};
   bool running_{false};
+  Solution alone_{};                        // room to work in: the codes without prior
+  BasicDopplerVelocity<Scalar> doppler_{};  // likewise
 };
 
 using SinglePointTracker = BasicSinglePointTracker<double>;  ///< in double precision
