@@ -112,71 +112,28 @@ class Estimator {
   using DopplerForm = typename Bound::DopplerForm;
 
   /// Settings of the robust policies are those of the forms themselves (their `loss`).
-  explicit Estimator(const Options& options = {}, const CodePhaseForm& code_phase = {}, const DopplerForm& doppler = {})
-      : options_(options), free_(options.rtk, code_phase, doppler), bound_(inertial_rtk(options.rtk), code_phase, doppler, options.inertial), initializer_(initializer_settings(options)),
-        detector_(options.inertial.preintegration.noise, options.inertial.detector) {}
+  explicit Estimator(const Options& options = {}, const CodePhaseForm& code_phase = {}, const DopplerForm& doppler = {});
 
   /// Broadcast records. Errors: capacity_exceeded.
-  Status add_ephemeris(const gnss::Ephemeris& e) {
-    (void)bound_.add_ephemeris(e);
-    return free_.add_ephemeris(e);
-  }
+  Status add_ephemeris(const gnss::Ephemeris& e);
   void set_ionosphere(const gnss::KlobucharCoefficients& k) { free_.set_ionosphere(k), bound_.set_ionosphere(k); }
   /// Base antenna, ECEF metres. Errors: non_finite, invalid_argument.
-  Status set_base_position(const Eigen::Vector3d& position_e_m) {
-    (void)bound_.set_base_position(position_e_m);
-    return free_.set_base_position(position_e_m);
-  }
+  Status set_base_position(const Eigen::Vector3d& position_e_m);
   /// A heading from elsewhere, clockwise from north, of the present moment. Errors: those of imu::Initializer::set_heading.
-  Status set_heading(double heading_rad, double sigma_rad) { return initializer_.set_heading(heading_rad, sigma_rad); }
+  Status set_heading(double heading_rad, double sigma_rad);
 
   /// A map of lanes for stretches without integers (options: inertial.lanes, inertial.lane_way_m), in the caller's memory for as long as it is used.
   /// A state that is not on a lane yet costs one pass over all of it.
   void set_centrelines(imu::Centrelines lines) { bound_.motion().set_centrelines(lines); }
 
   /// A reading, in time order. Errors: non_finite, duplicate, out_of_order, capacity_exceeded (ask next() for solutions more often).
-  Status add_imu(const imu::ImuSample& sample) {
-    if (!sample.finite()) return failure(StatusCode::non_finite, "IMU sample with a NaN or infinite reading");
-    if (has_imu_ && sample.time == newest_imu_) return failure(StatusCode::duplicate, "IMU sample with the time of the one before");
-    if (has_imu_ && sample.time < newest_imu_) return failure(StatusCode::out_of_order, "IMU sample earlier than the one before");
-    if (samples_.full() && !aligned_ && epochs_.empty() && positions_.empty()) samples_.pop();  // nothing to align with yet: the oldest say least
-    if (!samples_.push(sample)) return failure(StatusCode::capacity_exceeded, "IMU samples wait for next(): take solutions more often");
-    has_imu_ = true, newest_imu_ = sample.time;
-    if (aligned_) (void)ahead_.push(sample);  // what it refuses is refused again, and acted on, where the state is made
-    see(sample.time);
-    return ok_status();
-  }
+  Status add_imu(const imu::ImuSample& sample);
   /// A base epoch, in time order. Errors: duplicate, out_of_order.
-  Status add_base(const gnss::ObservationEpoch& epoch) {
-    (void)bound_.add_base(epoch);
-    const Status s = free_.add_base(epoch);
-    if (s.ok()) base_rhythm_.note(epoch.tag);
-    return s;
-  }
+  Status add_base(const gnss::ObservationEpoch& epoch);
   /// A rover epoch, in time order. Errors: duplicate, out_of_order (also: later than the latency), capacity_exceeded.
-  Status add_rover(const gnss::ObservationEpoch& epoch) {
-    if (has_rover_ && epoch.tag <= newest_rover_)
-      return failure(epoch.tag == newest_rover_ ? StatusCode::duplicate : StatusCode::out_of_order, "rover epoch not after the last one");
-    if (is_answered(epoch.tag)) return failure(StatusCode::out_of_order, "rover epoch later than the declared latency");
-    if (!epochs_.push(epoch)) return failure(StatusCode::capacity_exceeded, "rover epochs wait for next(): take solutions more often");
-    has_rover_ = true, newest_rover_ = epoch.tag;
-    rover_rhythm_.note(epoch.tag);
-    see(epoch.tag);
-    return ok_status();
-  }
+  Status add_rover(const gnss::ObservationEpoch& epoch);
   /// A position of the antenna from another program or receiver (loose coupling), in time order. Errors: duplicate, out_of_order, capacity_exceeded.
-  Status add_position(const imu::PositionFix& fix) {
-    const Vector3& position_e_m = fix.position_e_m;
-    const Matrix3& covariance_e_m2 = fix.covariance_e_m2;
-    if (!position_e_m.allFinite() || !covariance_e_m2.allFinite()) return failure(StatusCode::non_finite, "position or its covariance is not finite");
-    if (has_rover_ && fix.time <= newest_rover_) return failure(fix.time == newest_rover_ ? StatusCode::duplicate : StatusCode::out_of_order, "position not after the last one");
-    if (is_answered(fix.time)) return failure(StatusCode::out_of_order, "position later than the declared latency");
-    if (!positions_.push(fix)) return failure(StatusCode::capacity_exceeded, "positions wait for next(): take solutions more often");
-    has_rover_ = true, newest_rover_ = fix.time;
-    rover_rhythm_.note(fix.time);
-    see(fix.time);
-    return ok_status();
-  }
+  Status add_position(const imu::PositionFix& fix);
   /// A frame, in time order. Those from before the alignment are let go. Errors: duplicate, out_of_order (also: later than the latency),
   /// capacity_exceeded.
   template <class Frame>
@@ -195,38 +152,10 @@ class Estimator {
   void finish() { finished_ = true; }
 
   /// The next solution that is due. Errors: no_data when none is (is_nothing_due()); else what is wrong with the epoch that was next (it is gone then).
-  Result<RtkSolution> next() {
-    if constexpr (Motion::has_camera)
-      while (is_frame_next()) {
-        if (!is_frame_due(frames_.front().time)) return failure(StatusCode::no_data, kNothingDue);
-        stereo_frame_ = frames_.front();
-        frames_.pop();
-        Result<RtkSolution> seen = solve(stereo_frame_);
-        if (seen.ok()) return answer(std::move(seen));
-        if (seen.status().code != StatusCode::no_data) ++refused_frames_, frame_status_ = seen.status();
-      }
-    if (!epochs_.empty() && is_due(epochs_.front().tag, true)) {
-      // Copied: the queue's place may be taken while the epoch is worked on.
-      epoch_ = epochs_.front();
-      epochs_.pop();
-      return answer(solve(epoch_));
-    }
-    if (!positions_.empty() && is_due(positions_.front().time, false)) {
-      const imu::PositionFix fix = positions_.front();
-      positions_.pop();
-      return answer(solve(fix));
-    }
-    if (is_silent()) return answer(bridge());
-    return failure(StatusCode::no_data, kNothingDue);
-  }
+  Result<RtkSolution> next();
 
   /// The antenna at a time after the newest state, from readings alone: output at the unit's rate. Errors: no_data (not aligned, not covered).
-  [[nodiscard]] Result<RtkSolution> predict(GpsTime time) const {
-    if (!aligned_) return failure(StatusCode::no_data, "not aligned yet");
-    const auto motion = ahead_.until(time);
-    if (!motion.ok()) return motion.status();
-    return bound_.predict_by(*motion);
-  }
+  [[nodiscard]] Result<RtkSolution> predict(GpsTime time) const;
 
   [[nodiscard]] bool is_aligned() const { return aligned_; }
   /// What the alignment is at, and in words what it waits for.
@@ -485,5 +414,108 @@ class Estimator {
   bool has_frame_time_{false}, has_imu_{false}, has_rover_{false}, has_input_{false}, has_answered_{false}, has_frame_{false}, aligned_{false}, finished_{false};
   int alignments_{0}, restarts_{0};
 };
+
+// ---- the interface: outside the class, so that a file that sees it declared `extern template` does not instantiate it and all below it -------------------
+
+template <template <class> class Form, class CapacityType, class MotionType>
+Estimator<Form, CapacityType, MotionType>::Estimator(const Options& options, const CodePhaseForm& code_phase, const DopplerForm& doppler)
+    : options_(options), free_(options.rtk, code_phase, doppler), bound_(inertial_rtk(options.rtk), code_phase, doppler, options.inertial), initializer_(initializer_settings(options)),
+      detector_(options.inertial.preintegration.noise, options.inertial.detector) {}
+
+template <template <class> class Form, class CapacityType, class MotionType>
+Status Estimator<Form, CapacityType, MotionType>::add_ephemeris(const gnss::Ephemeris& e) {
+  (void)bound_.add_ephemeris(e);
+  return free_.add_ephemeris(e);
+}
+
+template <template <class> class Form, class CapacityType, class MotionType>
+Status Estimator<Form, CapacityType, MotionType>::set_base_position(const Eigen::Vector3d& position_e_m) {
+  (void)bound_.set_base_position(position_e_m);
+  return free_.set_base_position(position_e_m);
+}
+
+template <template <class> class Form, class CapacityType, class MotionType>
+Status Estimator<Form, CapacityType, MotionType>::set_heading(double heading_rad, double sigma_rad) { return initializer_.set_heading(heading_rad, sigma_rad); }
+
+template <template <class> class Form, class CapacityType, class MotionType>
+Status Estimator<Form, CapacityType, MotionType>::add_imu(const imu::ImuSample& sample) {
+  if (!sample.finite()) return failure(StatusCode::non_finite, "IMU sample with a NaN or infinite reading");
+  if (has_imu_ && sample.time == newest_imu_) return failure(StatusCode::duplicate, "IMU sample with the time of the one before");
+  if (has_imu_ && sample.time < newest_imu_) return failure(StatusCode::out_of_order, "IMU sample earlier than the one before");
+  if (samples_.full() && !aligned_ && epochs_.empty() && positions_.empty()) samples_.pop();  // nothing to align with yet: the oldest say least
+  if (!samples_.push(sample)) return failure(StatusCode::capacity_exceeded, "IMU samples wait for next(): take solutions more often");
+  has_imu_ = true, newest_imu_ = sample.time;
+  if (aligned_) (void)ahead_.push(sample);  // what it refuses is refused again, and acted on, where the state is made
+  see(sample.time);
+  return ok_status();
+}
+
+template <template <class> class Form, class CapacityType, class MotionType>
+Status Estimator<Form, CapacityType, MotionType>::add_base(const gnss::ObservationEpoch& epoch) {
+  (void)bound_.add_base(epoch);
+  const Status s = free_.add_base(epoch);
+  if (s.ok()) base_rhythm_.note(epoch.tag);
+  return s;
+}
+
+template <template <class> class Form, class CapacityType, class MotionType>
+Status Estimator<Form, CapacityType, MotionType>::add_rover(const gnss::ObservationEpoch& epoch) {
+  if (has_rover_ && epoch.tag <= newest_rover_)
+    return failure(epoch.tag == newest_rover_ ? StatusCode::duplicate : StatusCode::out_of_order, "rover epoch not after the last one");
+  if (is_answered(epoch.tag)) return failure(StatusCode::out_of_order, "rover epoch later than the declared latency");
+  if (!epochs_.push(epoch)) return failure(StatusCode::capacity_exceeded, "rover epochs wait for next(): take solutions more often");
+  has_rover_ = true, newest_rover_ = epoch.tag;
+  rover_rhythm_.note(epoch.tag);
+  see(epoch.tag);
+  return ok_status();
+}
+
+template <template <class> class Form, class CapacityType, class MotionType>
+Status Estimator<Form, CapacityType, MotionType>::add_position(const imu::PositionFix& fix) {
+  const Vector3& position_e_m = fix.position_e_m;
+  const Matrix3& covariance_e_m2 = fix.covariance_e_m2;
+  if (!position_e_m.allFinite() || !covariance_e_m2.allFinite()) return failure(StatusCode::non_finite, "position or its covariance is not finite");
+  if (has_rover_ && fix.time <= newest_rover_) return failure(fix.time == newest_rover_ ? StatusCode::duplicate : StatusCode::out_of_order, "position not after the last one");
+  if (is_answered(fix.time)) return failure(StatusCode::out_of_order, "position later than the declared latency");
+  if (!positions_.push(fix)) return failure(StatusCode::capacity_exceeded, "positions wait for next(): take solutions more often");
+  has_rover_ = true, newest_rover_ = fix.time;
+  rover_rhythm_.note(fix.time);
+  see(fix.time);
+  return ok_status();
+}
+
+template <template <class> class Form, class CapacityType, class MotionType>
+Result<RtkSolution> Estimator<Form, CapacityType, MotionType>::next() {
+  if constexpr (Motion::has_camera)
+    while (is_frame_next()) {
+      if (!is_frame_due(frames_.front().time)) return failure(StatusCode::no_data, kNothingDue);
+      stereo_frame_ = frames_.front();
+      frames_.pop();
+      Result<RtkSolution> seen = solve(stereo_frame_);
+      if (seen.ok()) return answer(std::move(seen));
+      if (seen.status().code != StatusCode::no_data) ++refused_frames_, frame_status_ = seen.status();
+    }
+  if (!epochs_.empty() && is_due(epochs_.front().tag, true)) {
+    // Copied: the queue's place may be taken while the epoch is worked on.
+    epoch_ = epochs_.front();
+    epochs_.pop();
+    return answer(solve(epoch_));
+  }
+  if (!positions_.empty() && is_due(positions_.front().time, false)) {
+    const imu::PositionFix fix = positions_.front();
+    positions_.pop();
+    return answer(solve(fix));
+  }
+  if (is_silent()) return answer(bridge());
+  return failure(StatusCode::no_data, kNothingDue);
+}
+
+template <template <class> class Form, class CapacityType, class MotionType>
+Result<RtkSolution> Estimator<Form, CapacityType, MotionType>::predict(GpsTime time) const {
+  if (!aligned_) return failure(StatusCode::no_data, "not aligned yet");
+  const auto motion = ahead_.until(time);
+  if (!motion.ok()) return motion.status();
+  return bound_.predict_by(*motion);
+}
 
 }  // namespace searvins::estimator

@@ -68,54 +68,23 @@ class RtkEstimator {
 
   /// Settings of the robust policies are those of the forms themselves (their `loss`).
   explicit RtkEstimator(const RtkOptions& options = {}, const CodePhaseForm& code_phase = {}, const DopplerForm& doppler = {},
-                        const typename Motion::Options& motion = {})
-      : options_(options), code_phase_form_(code_phase), doppler_form_(doppler), motion_(options, motion), tracker_(options.tracker) {
-    continuation_.mode = options.continuity;
-    continuation_.max_arc_epochs = options.arc_epochs;
-    if (is_instantaneous()) return;
-    options_.code_noise.min_scale = std::max(1.0, options.code_noise.min_scale);
-    options_.phase_noise.min_scale = std::max(1.0, options.phase_noise.min_scale);
-  }
+                        const typename Motion::Options& motion = {});
 
   /// Broadcast records. Errors: capacity_exceeded.
-  Status add_ephemeris(const gnss::Ephemeris& e) {
-    return ephemerides_.insert(e) ? ok_status() : failure(StatusCode::capacity_exceeded, "the ephemeris store is full: raise Capacity::ephemerides");
-  }
+  Status add_ephemeris(const gnss::Ephemeris& e);
   void set_ionosphere(const gnss::KlobucharCoefficients& k) { ephemerides_.ionosphere = k; }
   /// Base antenna, ECEF metres. Errors: non_finite, invalid_argument.
-  Status set_base_position(const Eigen::Vector3d& position_e_m) { return base_.set_position(position_e_m); }
+  Status set_base_position(const Eigen::Vector3d& position_e_m);
   /// A base epoch, in time order. Errors: duplicate, out_of_order.
-  Status add_base(const gnss::ObservationEpoch& epoch) { return base_.push(epoch); }
+  Status add_base(const gnss::ObservationEpoch& epoch);
 
   /// One rover epoch. A refused epoch (out_of_order, duplicate; no position at all yet: the tracker's status) leaves the estimator as it was; otherwise
   /// there is a solution, labelled with what it rests on.
-  Result<RtkSolution> update(const gnss::ObservationEpoch& rover) {
-    if (started_ && rover.tag <= last_tag_)
-      return failure(rover.tag == last_tag_ ? StatusCode::duplicate : StatusCode::out_of_order, "rover epoch not after the last one", -1, -1, seconds_between(last_tag_, rover.tag));
-    const Status found = tracker_.update(rover, ephemerides_, tracked_);
-    if (!found.ok() && !has_state_) return found;
-    const gnss::TrackedPosition* const tracked = found.ok() ? &tracked_ : nullptr;
-    RtkSolution out = begin(rover, tracked);
-    started_ = true, last_tag_ = rover.tag;
-    const Status differenced = difference(rover, tracked, out);
-    const bool is_differenced = differenced.ok() && epoch_.satellites >= options_.min_satellites;
-    is_undifferenced_ = false;
-    if (!is_differenced) continuation_.skip_epoch();
-    if (!is_differenced && goes_on_without_gnss()) without_base(rover);
-    const bool is_extended = (is_differenced || goes_on_without_gnss()) && extend(out);
-    if (is_extended)
-      estimate(out);
-    else
-      without_differences(tracked, out);
-    if (differenced.ok()) compared_ = Compared{out.time, out.position_e_m, is_extended};
-    return out;
-  }
+  Result<RtkSolution> update(const gnss::ObservationEpoch& rover);
 
   /// A state without GNSS observations at a time after the last one, where the motion policy carries the window on. Errors: no_data (it does not, or
   /// there is no state yet), out_of_order, and those of the motion (IMU coverage); nothing was changed then.
-  Result<RtkSolution> advance(GpsTime time) {
-    return advance_with(time, SolutionSource::readings, [](smoother::Key<State>, RtkSolution&) { return ok_status(); });
-  }
+  Result<RtkSolution> advance(GpsTime time);
   /// The same with a position from elsewhere (a type that the motion policy takes) at its time. Loose coupling; the status is the fix's.
   template <class Fix>
   Result<RtkSolution> advance_to(const Fix& fix) {
@@ -146,12 +115,7 @@ class RtkEstimator {
   }
 
   /// Starts from a known state (an alignment) in a frame; a window that is running is dropped.
-  void begin_at(const State& state, const StateCovariance& covariance, GpsTime time, const LocalFrame& frame) {
-    restart();
-    frame_ = frame;
-    motion_.set_frame(frame);
-    settle(state, covariance, time, true);
-  }
+  void begin_at(const State& state, const StateCovariance& covariance, GpsTime time, const LocalFrame& frame);
   /// The antenna at the end of a motion that begins at the newest state; nothing is changed. Errors: no_data.
   template <class Integrated>
   [[nodiscard]] Result<RtkSolution> predict_by(const Integrated& motion) const {
@@ -185,11 +149,7 @@ class RtkEstimator {
     Vector3 position_e_m{Vector3::Zero()};
     SolutionStatus status{SolutionStatus::dr};
   };
-  [[nodiscard]] Result<LaggedState> oldest() const {
-    if (!window_running()) return failure(StatusCode::no_data, "no window is running");
-    const Node& n = nodes_.front();
-    return LaggedState{n.time, frame_.to_ecef(n.antenna.position_w_m(*smoother_.find(n.state))), n.status};
-  }
+  [[nodiscard]] Result<LaggedState> oldest() const;
 
  private:
   using AmbiguityKey = smoother::Key<gnss::Ambiguity>;
@@ -1058,5 +1018,71 @@ class RtkEstimator {
   double code_variance_factor_{1}, phase_variance_factor_{1};  ///< of the epoch that is being added
   double code_information_share_{1};
 };
+
+// ---- the interface: outside the class, so that a file that sees it declared `extern template` does not instantiate it and all below it -------------------
+
+template <class Config>
+RtkEstimator<Config>::RtkEstimator(const RtkOptions& options, const CodePhaseForm& code_phase, const DopplerForm& doppler, const typename Motion::Options& motion)
+    : options_(options), code_phase_form_(code_phase), doppler_form_(doppler), motion_(options, motion), tracker_(options.tracker) {
+  continuation_.mode = options.continuity;
+  continuation_.max_arc_epochs = options.arc_epochs;
+  if (is_instantaneous()) return;
+  options_.code_noise.min_scale = std::max(1.0, options.code_noise.min_scale);
+  options_.phase_noise.min_scale = std::max(1.0, options.phase_noise.min_scale);
+}
+
+template <class Config>
+Status RtkEstimator<Config>::add_ephemeris(const gnss::Ephemeris& e) {
+  return ephemerides_.insert(e) ? ok_status() : failure(StatusCode::capacity_exceeded, "the ephemeris store is full: raise Capacity::ephemerides");
+}
+
+template <class Config>
+Status RtkEstimator<Config>::set_base_position(const Eigen::Vector3d& position_e_m) { return base_.set_position(position_e_m); }
+
+template <class Config>
+Status RtkEstimator<Config>::add_base(const gnss::ObservationEpoch& epoch) { return base_.push(epoch); }
+
+template <class Config>
+Result<RtkSolution> RtkEstimator<Config>::update(const gnss::ObservationEpoch& rover) {
+  if (started_ && rover.tag <= last_tag_)
+    return failure(rover.tag == last_tag_ ? StatusCode::duplicate : StatusCode::out_of_order, "rover epoch not after the last one", -1, -1, seconds_between(last_tag_, rover.tag));
+  const Status found = tracker_.update(rover, ephemerides_, tracked_);
+  if (!found.ok() && !has_state_) return found;
+  const gnss::TrackedPosition* const tracked = found.ok() ? &tracked_ : nullptr;
+  RtkSolution out = begin(rover, tracked);
+  started_ = true, last_tag_ = rover.tag;
+  const Status differenced = difference(rover, tracked, out);
+  const bool is_differenced = differenced.ok() && epoch_.satellites >= options_.min_satellites;
+  is_undifferenced_ = false;
+  if (!is_differenced) continuation_.skip_epoch();
+  if (!is_differenced && goes_on_without_gnss()) without_base(rover);
+  const bool is_extended = (is_differenced || goes_on_without_gnss()) && extend(out);
+  if (is_extended)
+    estimate(out);
+  else
+    without_differences(tracked, out);
+  if (differenced.ok()) compared_ = Compared{out.time, out.position_e_m, is_extended};
+  return out;
+}
+
+template <class Config>
+Result<RtkSolution> RtkEstimator<Config>::advance(GpsTime time) {
+  return advance_with(time, SolutionSource::readings, [](smoother::Key<State>, RtkSolution&) { return ok_status(); });
+}
+
+template <class Config>
+void RtkEstimator<Config>::begin_at(const State& state, const StateCovariance& covariance, GpsTime time, const LocalFrame& frame) {
+  restart();
+  frame_ = frame;
+  motion_.set_frame(frame);
+  settle(state, covariance, time, true);
+}
+
+template <class Config>
+auto RtkEstimator<Config>::oldest() const -> Result<LaggedState> {
+  if (!window_running()) return failure(StatusCode::no_data, "no window is running");
+  const Node& n = nodes_.front();
+  return LaggedState{n.time, frame_.to_ecef(n.antenna.position_w_m(*smoother_.find(n.state))), n.status};
+}
 
 }  // namespace searvins::estimator
