@@ -133,125 +133,18 @@ class FixedLagSmoother {
   [[nodiscard]] const auto& prior() const { return prior_; }
 
   /// Minimises the window. See the file comment and OptimiseReport.
-  Report optimise(const Options& options = {}) {
-    Report report;
-    if (window_.states().empty()) {
-      report.status = failure(StatusCode::no_data, "the window holds no state: add one first");
-      return report;
-    }
-    save();
-    if (!ensure_analysis()) return give_up(report, failure(StatusCode::capacity_exceeded, "Problem::member_capacity is too small for this window"));
-    Scalar cost = evaluate(Which::estimate);
-    report.initial_cost = report.final_cost = cost;
-    if (!std::isfinite(cost)) return give_up(report, failure(StatusCode::non_finite, "the cost of the present estimate is not finite: a factor or a value is broken"));
-    for (report.iterations = 1; report.iterations <= options.max_iterations; ++report.iterations) {
-      relinearise(options);
-      if (damped_) elimination_.mark_dirty_from(0), damped_ = false;
-      Scalar damping = 0;
-      bool accepted = false, whole = true;
-      Scalar step = 0;
-      for (int attempt = 0; attempt <= options.max_damping_steps; ++attempt) {
-        report.fronts_factored += elimination_.front_count() - elimination_.first_dirty();
-        const auto failure_report = factorise(damping);
-        if (!failure_report.ok()) {
-          const Status why = describe(failure_report, report.where);  // fills `where` before the report is copied
-          return give_up(report, why);
-        }
-        elimination_.solve(tables());
-        Scalar proposed = propose();
-        for (int halvings = 0; damping == 0 && !decreases(proposed, cost) && halvings < options.max_step_halvings; ++halvings) {
-          halve_step();
-          proposed = propose();
-          ++report.halved_steps, whole = false;
-        }
-        step = largest_step();
-        if (decreases(proposed, cost)) {
-          cost = proposed, accepted = true;
-          break;
-        }
-        damping = damping > 0 ? damping * 10 : options.initial_damping;
-        damped_ = true;
-        ++report.damped_steps;
-        elimination_.mark_dirty_from(0);
-      }
-      if (!accepted) {
-        // A vanishing step that rounding keeps from decreasing the cost is convergence, not failure.
-        if (step <= options.step_tolerance) {
-          (void)evaluate(Which::estimate);
-          report.last_step = step;
-          report.status = ok_status();
-          return report;
-        }
-        return give_up(report, failure(StatusCode::not_converged, "no damped step decreased the robust cost: values are as before"));
-      }
-      accept();
-      report.final_cost = cost, report.last_step = step;
-      if (whole && step <= options.step_tolerance) {  // a halved step is short because it was halved
-        report.status = ok_status();
-        return report;
-      }
-    }
-    --report.iterations;
-    report.status = failure(StatusCode::not_converged, "the iteration limit was reached; the improved values are kept", report.iterations);
-    return report;
-  }
+  Report optimise(const Options& options = {});
 
   /// Marginalises the oldest state, with the chain variables whose last use it is, the local variables it sees first, and all their factors. Robust
   /// weights are re-evaluated before they are frozen. Errors: no_data; capacity_exceeded, non_finite (the window is then unchanged).
-  MarginaliseReport marginalise_oldest(const Options& options = {}) {
-    MarginaliseReport report;
-    if (window_.states().empty()) {
-      report.status = failure(StatusCode::no_data, "the window holds no state");
-      return report;
-    }
-    if (!ensure_analysis()) {
-      report.status = failure(StatusCode::capacity_exceeded, "Problem::member_capacity is too small for this window");
-      return report;
-    }
-    (void)evaluate(Which::estimate);
-    relinearise(options);
-    if (damped_) elimination_.mark_dirty_from(0), damped_ = false;
-    const auto failed = factorise(0, math::ZeroPivot::skip, 0);
-    if (!failed.ok()) {
-      UnderDetermined where;
-      report.status = describe(failed, where);
-      return report;
-    }
-    if (report.status = form_prior(); !report.status.ok()) {
-      elimination_.mark_dirty_from(0);  // front 0 was factored without the test for zero pivots
-      return report;
-    }
-    remove_first_front(report);
-    return report;
-  }
+  MarginaliseReport marginalise_oldest(const Options& options = {});
 
   /// Forgets everything: no variables, factors or prior; every key is stale afterwards.
-  void clear() {
-    prior_.clear(window_);
-    (void)window_.erase_factors([](int) { return true; });
-    (void)window_.erase_variables([](int) { return true; });
-    elimination_.clear();
-    changed_ = true, damped_ = false;
-  }
+  void clear();
 
   /// Joint covariance (column-major, leading dimension ld) of any living variables, in the order of the keys, from the undamped factor at the present
   /// linearisation. Returns its size. Errors: no_data, unknown_key, capacity_exceeded, under_determined, invalid_argument.
-  Result<int> joint_covariance(const AnyKey* keys, int count, Scalar* out, int ld) {
-    if (window_.states().empty()) return failure(StatusCode::no_data, "the window holds no state: add one first");
-    if (!ensure_analysis()) return failure(StatusCode::capacity_exceeded, "Problem::member_capacity is too small for this window");
-    int n = 0;
-    if (count < 1 || count > static_cast<int>(ids_.size())) return failure(StatusCode::invalid_argument, "number of variables out of range", count);
-    for (int k = 0; k < count; ++k) {
-      ids_[static_cast<std::size_t>(k)] = window_.id_of(keys[k]);
-      if (ids_[static_cast<std::size_t>(k)] < 0) return failure(StatusCode::unknown_key, "the variable does not live (any more)", k);
-      n += window_.info(ids_[static_cast<std::size_t>(k)]).dof;
-    }
-    if (n > ld) return failure(StatusCode::invalid_argument, "the leading dimension is smaller than the joint tangent space", n, ld);
-    if (const Status s = ensure_factor(); !s.ok()) return s;
-    const int size = covariance_.joint(tables(), elimination_, ids_.data(), count, out, ld);
-    if (size < 0) return failure(StatusCode::under_determined, "a local variable without factors has no covariance");
-    return size;
-  }
+  Result<int> joint_covariance(const AnyKey* keys, int count, Scalar* out, int ld);
 
   template <class V>
   Result<Eigen::Matrix<Scalar, V::dof, V::dof>> covariance(const Key<V>& key) {
@@ -263,7 +156,7 @@ class FixedLagSmoother {
   }
 
   /// Sum of rho at the present estimate, prior included.
-  [[nodiscard]] Scalar cost() { return evaluate(Which::estimate); }
+  [[nodiscard]] Scalar cost();
 
  private:
   /// Share of the cost that its summation may round away: a step within it is no increase.
@@ -588,5 +481,129 @@ class FixedLagSmoother {
   bool changed_{true};
   bool damped_{false};  ///< the stored fronts contain damping
 };
+
+// ---- the interface: outside the class, so that a file that sees it declared `extern template` does not instantiate it and all below it -------------------
+
+template <class Problem>
+auto FixedLagSmoother<Problem>::optimise(const Options& options) -> Report {
+  Report report;
+  if (window_.states().empty()) {
+    report.status = failure(StatusCode::no_data, "the window holds no state: add one first");
+    return report;
+  }
+  save();
+  if (!ensure_analysis()) return give_up(report, failure(StatusCode::capacity_exceeded, "Problem::member_capacity is too small for this window"));
+  Scalar cost = evaluate(Which::estimate);
+  report.initial_cost = report.final_cost = cost;
+  if (!std::isfinite(cost)) return give_up(report, failure(StatusCode::non_finite, "the cost of the present estimate is not finite: a factor or a value is broken"));
+  for (report.iterations = 1; report.iterations <= options.max_iterations; ++report.iterations) {
+    relinearise(options);
+    if (damped_) elimination_.mark_dirty_from(0), damped_ = false;
+    Scalar damping = 0;
+    bool accepted = false, whole = true;
+    Scalar step = 0;
+    for (int attempt = 0; attempt <= options.max_damping_steps; ++attempt) {
+      report.fronts_factored += elimination_.front_count() - elimination_.first_dirty();
+      const auto failure_report = factorise(damping);
+      if (!failure_report.ok()) {
+        const Status why = describe(failure_report, report.where);  // fills `where` before the report is copied
+        return give_up(report, why);
+      }
+      elimination_.solve(tables());
+      Scalar proposed = propose();
+      for (int halvings = 0; damping == 0 && !decreases(proposed, cost) && halvings < options.max_step_halvings; ++halvings) {
+        halve_step();
+        proposed = propose();
+        ++report.halved_steps, whole = false;
+      }
+      step = largest_step();
+      if (decreases(proposed, cost)) {
+        cost = proposed, accepted = true;
+        break;
+      }
+      damping = damping > 0 ? damping * 10 : options.initial_damping;
+      damped_ = true;
+      ++report.damped_steps;
+      elimination_.mark_dirty_from(0);
+    }
+    if (!accepted) {
+      // A vanishing step that rounding keeps from decreasing the cost is convergence, not failure.
+      if (step <= options.step_tolerance) {
+        (void)evaluate(Which::estimate);
+        report.last_step = step;
+        report.status = ok_status();
+        return report;
+      }
+      return give_up(report, failure(StatusCode::not_converged, "no damped step decreased the robust cost: values are as before"));
+    }
+    accept();
+    report.final_cost = cost, report.last_step = step;
+    if (whole && step <= options.step_tolerance) {  // a halved step is short because it was halved
+      report.status = ok_status();
+      return report;
+    }
+  }
+  --report.iterations;
+  report.status = failure(StatusCode::not_converged, "the iteration limit was reached; the improved values are kept", report.iterations);
+  return report;
+}
+
+template <class Problem>
+auto FixedLagSmoother<Problem>::marginalise_oldest(const Options& options) -> MarginaliseReport {
+  MarginaliseReport report;
+  if (window_.states().empty()) {
+    report.status = failure(StatusCode::no_data, "the window holds no state");
+    return report;
+  }
+  if (!ensure_analysis()) {
+    report.status = failure(StatusCode::capacity_exceeded, "Problem::member_capacity is too small for this window");
+    return report;
+  }
+  (void)evaluate(Which::estimate);
+  relinearise(options);
+  if (damped_) elimination_.mark_dirty_from(0), damped_ = false;
+  const auto failed = factorise(0, math::ZeroPivot::skip, 0);
+  if (!failed.ok()) {
+    UnderDetermined where;
+    report.status = describe(failed, where);
+    return report;
+  }
+  if (report.status = form_prior(); !report.status.ok()) {
+    elimination_.mark_dirty_from(0);  // front 0 was factored without the test for zero pivots
+    return report;
+  }
+  remove_first_front(report);
+  return report;
+}
+
+template <class Problem>
+void FixedLagSmoother<Problem>::clear() {
+  prior_.clear(window_);
+  (void)window_.erase_factors([](int) { return true; });
+  (void)window_.erase_variables([](int) { return true; });
+  elimination_.clear();
+  changed_ = true, damped_ = false;
+}
+
+template <class Problem>
+Result<int> FixedLagSmoother<Problem>::joint_covariance(const AnyKey* keys, int count, Scalar* out, int ld) {
+  if (window_.states().empty()) return failure(StatusCode::no_data, "the window holds no state: add one first");
+  if (!ensure_analysis()) return failure(StatusCode::capacity_exceeded, "Problem::member_capacity is too small for this window");
+  int n = 0;
+  if (count < 1 || count > static_cast<int>(ids_.size())) return failure(StatusCode::invalid_argument, "number of variables out of range", count);
+  for (int k = 0; k < count; ++k) {
+    ids_[static_cast<std::size_t>(k)] = window_.id_of(keys[k]);
+    if (ids_[static_cast<std::size_t>(k)] < 0) return failure(StatusCode::unknown_key, "the variable does not live (any more)", k);
+    n += window_.info(ids_[static_cast<std::size_t>(k)]).dof;
+  }
+  if (n > ld) return failure(StatusCode::invalid_argument, "the leading dimension is smaller than the joint tangent space", n, ld);
+  if (const Status s = ensure_factor(); !s.ok()) return s;
+  const int size = covariance_.joint(tables(), elimination_, ids_.data(), count, out, ld);
+  if (size < 0) return failure(StatusCode::under_determined, "a local variable without factors has no covariance");
+  return size;
+}
+
+template <class Problem>
+auto FixedLagSmoother<Problem>::cost() -> Scalar { return evaluate(Which::estimate); }
 
 }  // namespace searvins::smoother
