@@ -17,7 +17,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
-#include <ctime>
 #include <memory>
 #include <optional>
 #include <random>
@@ -27,6 +26,7 @@
 
 #include <searvins/ambiguity/lambda.hpp>
 
+#include "bench/processor_time.hpp"
 #include "bench/svg_plot.hpp"
 #include "support/ambiguity_problems.hpp"
 #include "support/shared_data.hpp"
@@ -35,6 +35,7 @@
 namespace {
 
 using namespace searvins::test;
+using searvins::bench::processor_ms;
 
 constexpr std::size_t kWarmUpFrames = 210, kTimedFrames = 100;
 constexpr int kPasses = 3;
@@ -52,12 +53,6 @@ struct GrowthProblem : FixedLagProblem {
   static constexpr std::size_t arena_scalars = std::size_t{202} * (391 * 15 + 376 * 376 + 375);
 };
 using GrowthRun = BasicFixedLagRun<GrowthProblem>;
-
-double processor_ms() {
-  timespec t{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
-}
 
 double median(std::vector<double> v) {
   const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);

@@ -13,22 +13,14 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
-#include <new>
 #include <string>
 #include <vector>
 
+#include "bench/processor_time.hpp"
+#include "support/allocation_counter.hpp"
 #include "vision/fixed_lag_workload.hpp"
 
 namespace {
-
-long allocations = 0;
-
-double processor_ms() {
-  timespec t{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
-}
 
 /// The number after `name=` among the arguments.
 double option(int argc, char** argv, const std::string& name, double otherwise) {
@@ -42,16 +34,9 @@ double option(int argc, char** argv, const std::string& name, double otherwise) 
 /// What a profiler is told to collect.
 extern "C" [[gnu::noinline]] void timed_update(searvins::test::FixedLagRun* run) { run->update(); }
 
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* p = std::malloc(size)) return p;
-  std::abort();
-}
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
-
 int main(int argc, char** argv) {
-  using searvins::test::FixedLagRun;
+  using searvins::bench::processor_ms;
+  using searvins::test::FixedLagRun, searvins::test::heap_allocations;
   if (argc < 2) return std::fprintf(stderr, "usage: fixed_lag_timing DATA [steps=1] [frames=1200] [relinearise=0] [weight=0] [halvings=2] [print=0]\n"), 2;
   const auto workload = searvins::test::read_fixed_lag_workload(argv[1]);
   if (!workload) return std::fprintf(stderr, "no workload in %s\n", argv[1]), 1;
@@ -65,17 +50,17 @@ int main(int argc, char** argv) {
   FixedLagRun run(*workload, options);
   std::vector<double> ms;
   ms.reserve(frames);
-  long counted = 0;
+  unsigned long long counted = 0;
   while (run.frame() < frames) {
     const double begin = processor_ms();
-    const long before = allocations;
+    const unsigned long long before = heap_allocations();
     if (run.frame() < kWarmUp) {
       run.update();
       continue;
     }
     timed_update(&run);
     ms.push_back(processor_ms() - begin);
-    counted += allocations - before;
+    counted += heap_allocations() - before;
   }
   if (ms.empty()) return std::fprintf(stderr, "frames must exceed %zu\n", kWarmUp), 2;
   double sum = 0;

@@ -14,29 +14,22 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
-#include <cstdlib>
-#include <ctime>
-#include <new>
 
+#include "bench/processor_time.hpp"
+#include "support/allocation_counter.hpp"
 #include "vision/fixed_lag_workload.hpp"
 
 namespace {
 
 using namespace searvins;
+using bench::processor_ms;
 using test::FixedLagRun;
 using test::FixedLagWorkload;
+using test::heap_allocations;
 
 constexpr std::size_t kFrames = 10'000, kWindow = 31;
 constexpr int kBornAFrame = 3, kTrackLength = 10, kPatterns = 9;
 constexpr double kPeriodS = 0.1, kSpeedMps = 10, kGravityMps2 = 9.81, kFirstDepthM = 30;
-
-long allocations = 0;
-
-double processor_ms() {
-  timespec t{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
-}
 
 long peak_kilobytes() {
   rusage usage{};
@@ -85,7 +78,8 @@ FixedLagWorkload steady_drive() {
 struct Stretch {
   const char* name;
   double ms{0};
-  long heap{0}, peak_kb{0};
+  unsigned long long heap{0};
+  long peak_kb{0};
 };
 
 }  // namespace
@@ -93,14 +87,6 @@ struct Stretch {
 /// What a profiler is told to collect.
 extern "C" [[gnu::noinline]] void early_update(FixedLagRun* run) { run->update(); }
 extern "C" [[gnu::noinline]] void late_update(FixedLagRun* run) { run->update(); }
-
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* p = std::malloc(size)) return p;
-  std::abort();
-}
-[[gnu::noinline]] void operator delete(void* p) noexcept { std::free(p); }
-[[gnu::noinline]] void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 
 int main() {
   const FixedLagWorkload workload = steady_drive();
@@ -115,9 +101,9 @@ int main() {
     }
     Stretch& s = stretches[late ? 1 : 0];
     const double begin = processor_ms();
-    const long before = allocations;
+    const unsigned long long before = heap_allocations();
     early ? early_update(&run) : late_update(&run);
-    s.ms += processor_ms() - begin, s.heap += allocations - before, s.peak_kb = peak_kilobytes();
+    s.ms += processor_ms() - begin, s.heap += heap_allocations() - before, s.peak_kb = peak_kilobytes();
   }
   for (const Stretch& s : stretches)
     std::printf("updates %s: mean %.4f ms, %.2f allocations, peak of the process %ld kB\n", s.name, s.ms / 1000, static_cast<double>(s.heap) / 1000,

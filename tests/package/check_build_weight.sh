@@ -29,7 +29,7 @@ int main() {
   return std::printf("%.6f %.6f %.3f\n", g.lat_rad, g.lon_rad, g.height_m) > 0 ? 0 : 1;
 }
 CPP
-# What a file of a program does whose estimator is compiled once, by searvins_add_instances(): all of the interface that it may call.
+# What a file of a program does whose estimator is compiled once, by searvins_add_instances(): the interface that it may call, but add_stereo(), a template.
 cat >"$work/instance.cpp" <<'CPP'
 #include <searvins/estimator/estimator.hpp>
 using Drive = searvins::estimator::Estimator<searvins::robust::LatentPivotSymmetric>;
@@ -39,6 +39,7 @@ extern template class searvins::estimator::RtkEstimator<searvins::estimator::Rtk
 Drive drive;
 Rtk rtk;
 bool run(const searvins::gnss::ObservationEpoch& epoch, const searvins::imu::ImuSample& sample, const searvins::gnss::Ephemeris& ephemeris) {
+  drive.set_ionosphere({}), drive.set_centrelines({}), drive.finish(), rtk.set_ionosphere({});
   const bool fed = drive.add_ephemeris(ephemeris).ok() && drive.set_base_position({}).ok() && drive.set_heading(0, 1).ok() && drive.add_imu(sample).ok() &&
                    drive.add_base(epoch).ok() && drive.add_rover(epoch).ok() && drive.add_position({}).ok();
   const bool given = rtk.add_ephemeris(ephemeris).ok() && rtk.set_base_position({}).ok() && rtk.add_base(epoch).ok();

@@ -55,11 +55,11 @@ void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
 }
 #else
 // Kept out of line: inlined into a caller, malloc/free look like a mismatched pair to the compiler.
-void* operator new(std::size_t size) {
+[[gnu::noinline]] void* operator new(std::size_t size) {
   ++searvins::test::allocation_count;
   if (void* const p = std::malloc(size ? size : 1)) return p;
   std::abort();
 }
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+[[gnu::noinline]] void operator delete(void* p) noexcept { std::free(p); }
+[[gnu::noinline]] void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 #endif

@@ -111,7 +111,7 @@ struct DifferencedEpochFacts {
   std::array<std::uint16_t, kRejections> rejected{};  ///< how many, by reason
 };
 
-/// Everything differencing knows of one epoch. Some 30 kB: where a stack is small, keep one and have it filled.
+/// Everything differencing knows of one epoch. Some 25 kB: where a stack is small, keep one and have it filled.
 struct DifferencedEpoch : DifferencedEpochFacts {
   StaticVector<CorrectedSignal, kMaxCorrectedSignals> signals{};  ///< by satellite, then in the order of the pairs
   StaticVector<SignalGroup, kMaxSignalGroups> groups{};

@@ -87,7 +87,7 @@ struct BasicDopplerEstimate {
   [[nodiscard]] math::Matrix3<Scalar> velocity_covariance_m2ps2() const { return covariance.template topLeftCorner<3, 3>(); }
 };
 
-/// Velocity and drift of one epoch. Some 10 kB: where a stack is small, keep one and have it filled.
+/// Velocity and drift of one epoch. Some 8 kB: where a stack is small, keep one and have it filled.
 template <class Scalar>
 struct BasicDopplerVelocity : BasicDopplerEstimate<Scalar> {
   StaticVector<BasicDopplerRow<Scalar>, kMaxDopplerRows> rows{};
@@ -266,7 +266,7 @@ Status solve_doppler_velocity(const ObservationEpoch& epoch, const EphemerisStor
   return s;
 }
 
-/// The same by value: some 10 kB, several times on its way.
+/// The same by value: some 8 kB, several times on its way.
 template <class Scalar = double, std::size_t N>
 [[nodiscard]] Result<BasicDopplerVelocity<Scalar>> solve_doppler_velocity(const ObservationEpoch& epoch, const EphemerisStore<N>& store,
                                                                           const math::Vector3<Scalar>& position_e_m,

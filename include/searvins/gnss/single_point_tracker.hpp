@@ -160,9 +160,9 @@ class BasicSinglePointTracker {
   [[nodiscard]] Status start(const ObservationEpoch& epoch, const EphemerisStore<N>& store, TrackStatus status, Position& out) {
     running_ = false;
     out.clear();
-    const Solution& s = out.single_point;
     if (const Status located = solve_single_point(epoch, store, options_.single_point, std::nullopt, out.single_point); !located)
       return located;
+    const Solution& s = out.single_point;
     x_.setZero();
     P_.setZero();
     x_.template tail<kSinglePointUnknowns>() = s.state;
